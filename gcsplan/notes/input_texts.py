@@ -134,6 +134,7 @@ INPUT_TEXTS = {
         "limits without a unit or a reference are read as OpenAir's programs do, in feet above sea level"
     ),
     "zone_limits_move": ("the limits of these zones move: at that end they count from the ground up, or without end"),
+    "zone_limits_empty": "an empty AL or AH is no limit: these zones count from the ground up, or without end",
     "zone_limits_not_understood": ("these zones are understood in part: they count from the ground up without end"),
     "zone_corner_altitudes_unread": "the altitudes of corners are not read as limits",
     "zone_drawn_altitudes_unread": "the drawn altitudes are not read as limits",

@@ -24,6 +24,7 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import dropwhile
 from pathlib import Path
 from typing import Any
 
@@ -254,12 +255,12 @@ def elements(form: str, content: Any) -> dict[str, Element]:
         parts = re.split(r"<Placemark>", content)[1:]
         made = {}
         for i, part in enumerate(parts, start=1):
-            names = (f"a[{i}]", *re.findall(r"<name>([^<]+)", part))
+            names = (f"a[{i}]", *map(str.strip, re.findall(r"<name>([^<]+)", part)))
             made[f"Placemark {i}"] = Element(part.split("</Placemark>")[0], (f"Placemark {i}", *names))
         return made
     if form == "csv":
         filled = [(i + 1, line) for i, line in enumerate(lines) if line.strip(" ,;\t")]
-        rows = filled[2 if filled and filled[0][1].startswith("sep=") else 1 :]
+        rows = list(dropwhile(lambda row: row[1].startswith("sep="), filled))[1:]
         return {
             f"line {i}": Element(line, (f"line {i}", f"a[{i}]", re.split(r"[,;\t]", line)[0].strip()))
             for i, line in rows

@@ -14,6 +14,7 @@ from gcsplan.mavlink.files.waypoints_file import parse_waypoints
 from gcsplan.mission_file.published.policy import Policy
 from gcsplan.mission_file.published.unused import used
 from gcsplan.mission_file.zone_reader import read_zones
+from gcsplan.mission_file.zones.draft import zone_notes
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot
 
@@ -33,6 +34,7 @@ def zones(path: Path) -> list[tuple[tuple[float, float], ...]]:
         PLAIN,
         ("DP 460000.00N 0143000.00E", "DP 460500.00N 0143000.00E", "DP 460500N 0143630E"),
         ("DP N46:00:00 E014:30:00", "DP N460500.00 E0143000.00", "DP N 46:05:00 E 014:36:30"),
+        ("DP 46 00 00 N 014 30 00 E", "DP 46 05 N 14 30 E", "DP N46 05 00 E014 36 30.0"),
     ],
 )
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "latin-1"])
@@ -53,6 +55,25 @@ def test_places_that_are_none_stay_refused(tmp_path: Path, place: str) -> None:
     found = read_zones(path, where="zones")
     assert found.zones == []
     assert [place in str(problem) for problem in found.problems] == [True]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "bounds", "words"),
+    [
+        ("AL GND", "AL", "None 1066.8 m AMSL", "an empty AL or AH is no limit"),
+        ("AL GND", "al \t", "None 1066.8 m AMSL", "an empty AL or AH is no limit"),
+        ("AH 3500FT AMSL", "AH", "None None", "an empty AL or AH is no limit"),
+        ("AC R", "AC", "None None", "AC has no class"),
+    ],
+)
+def test_empty_records_of_openair_limit_nothing(tmp_path: Path, old: str, new: str, bounds: str, words: str) -> None:
+    path = tmp_path / "a.txt"
+    path.write_text(OPENAIR.replace(old, new).format(*PLAIN), encoding="utf-8")
+    found = read_zones(path, where="zones", policy=Policy(kinds=("R",)) if old != "AC R" else None)
+    (draft,) = found.zones
+    assert not found.problems
+    assert f"{draft.floor} {draft.ceiling}" == bounds
+    assert words in "".join(map(str, zone_notes([(draft, None)])))
 
 
 @pytest.mark.parametrize("head", ["sep=\t\n", "sep=;\n", '"sep=;"\n', "SEP=;;;;\n\n"])

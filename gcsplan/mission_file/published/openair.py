@@ -44,6 +44,7 @@ IGNORED = frozenset({"AF", "AG", "AX", "AI", "AT", "SP", "SB"})
 
 DRAWING_RECORDS = frozenset({"DP", "DA", "DB", "DC", "DY"})
 
+EMPTY_LIMITS = Note("zone_limits_empty")
 UNSTATED_LIMITS = Note("zone_limits_in_feet_above_sea")
 
 _RECORD = re.compile(r"(V|[A-Z]{2})\s+(\S.*)", re.IGNORECASE)
@@ -57,6 +58,8 @@ _PART = r"(\d{1,3}(?:\.\d{1,20})?(?:\s*:\s*\d{1,2}(?:\.\d{1,20})?){0,2})"
 _LETTERS_FIRST = re.compile(rf"([NS])\s*{_PART}[\s,]*([EW])\s*{_PART}", re.ASCII | re.IGNORECASE)
 _COMPACT = re.compile(r"(?<![\d:.])(\d{2,3})([0-5]\d)([0-5]\d(?:\.\d{1,20})?)(?![\d:.])", re.ASCII)
 """Degrees, minutes and seconds in one number, such as 460500.00N 0143000.00E."""
+_SPACED = re.compile(r"(?<=\d)[ \t]+(?=\d)", re.ASCII)
+"""Between degrees, minutes and seconds, such as 46 05 00 N 014 30 00 E; between two places there are letters."""
 _LONGEST_LINE = 2000
 
 MOST_MISTAKES, MOST_FAULTS = 5, 1000
@@ -156,7 +159,14 @@ class _OpenAirReading:
         self.file.fault(f"{self.file.path}: line {number}", words)
 
     def _odd(self, number: int, record: str) -> None:
-        if record[:2].upper() in ("AN", "AY", "AF", "AG", "AX", "AI", "AT") and len(record) == 2:  # an empty record
+        code = record.upper()
+        if code in ("AN", "AY", *IGNORED):  # an empty record
+            return
+        if code == "AC":  # without a class the zone is no-fly, and never a part of the one before
+            self._record(number, code, "")
+            return
+        if code in ("AL", "AH") and self.block is not None:
+            self.block.remarks.append((EMPTY_LIMITS, Note("line_of_file", line=number, text=code)))
             return
         words = f"{record[:60]!r} is no record of OpenAir; write a comment with * before it"
         if self.block is not None:
@@ -167,7 +177,8 @@ class _OpenAirReading:
     def _record(self, number: int, code: str, value: str) -> None:
         if code == "AC":
             self._end()
-            self.block, self.passed = _Block(number, [_kind(value)]), False
+            self.block, self.passed = _Block(number, [_kind(value)] if value else []), False
+            self.block.mistakes += [] if value else [(number, "AC has no class")]
         elif code in ("TO", "TC"):  # terrain, which other records draw as they draw zones
             self._end()
             self.passed = True
@@ -339,7 +350,7 @@ def _places(text: str, count: int) -> tuple[list[Corner], str]:
     """The first places of a text, and what follows them, which is no place."""
     places: list[Corner] = []
     at = 0
-    text = _COMPACT.sub(r"\1:\2:\3", text)
+    text = _SPACED.sub(":", _COMPACT.sub(r"\1:\2:\3", text))
     if text[:1].upper() in ("N", "S"):
         text = _LETTERS_FIRST.sub(r"\2 \1 \4 \3", text)
     for match in _matches(text):

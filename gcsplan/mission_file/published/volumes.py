@@ -217,17 +217,16 @@ class AirspaceFile:
         if not why:
             self._add(zone, part, where, tuple(outline), None, limits, [], doubt)
             return
+        if len(set(outline)) < 3:  # where its other corners are is unknown
+            self.fault(where, f"zone {zone.name[:60]!r}: {why}; {OUTLINE_CURE}", zone)
+            return
         at = np.asarray(outline, float)
         tangled = overlapping_pairs(at) > MOST_EDGE_PAIRS or crossings(at) > MOST_CROSSINGS
         if tangled:
             why = f"its outline of {len(outline)} corners is too tangled to tell what it encloses"
-        parts = enclosed(outline) if len(set(outline)) > 2 and not tangled else []
+        parts = [] if tangled else enclosed(outline)
         if not parts:
-            why = f"{why}; {OUTLINE_CURE}"
-            if len(set(outline)) > 2:
-                self._add(zone, part, where, self._around(ring), None, limits, [Mistake(where, why)])
-            else:  # where its other corners are is unknown
-                self.fault(where, f"zone {zone.name[:60]!r}: {why}", zone)
+            self._add(zone, part, where, self._around(ring), None, limits, [Mistake(where, f"{why}; {OUTLINE_CURE}")])
             return
         if self.great_circles:  # whose crossings lie elsewhere
             try:

@@ -123,7 +123,11 @@ def _placemark(found: ZoneFile, placemark: Any, number: int) -> None:
     stated = read_attributes(given, where, f"{found.path.stem}[{number}]", found.problems)
     if stated is None:
         return
-    shapes = [e for e in _walk(placemark, found.path, leaves=_KML_SHAPES) if _kind(e) in _KML_SHAPES]
+    below = list(_walk(placemark, found.path, leaves=_KML_SHAPES))
+    if any(_kind(e) == "Placemark" for e in below[1:]):
+        found.problems.append(Mistake(where, "holds another Placemark; end each before the next begins"))
+        return
+    shapes = [e for e in below if _kind(e) in _KML_SHAPES]
     others = dict.fromkeys(_kind(e) for e in shapes if _kind(e) not in _READ_SHAPES)
     for kind in others or ([] if shapes else ["none"]):
         words = f"its geometry must be Polygons, Points with a radius_m or LineStrings with a buffer_m, given {kind}"
