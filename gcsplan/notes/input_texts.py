@@ -177,7 +177,7 @@ INPUT_TEXTS = {
     "line_of_file": "line {line}: {text}",
     # -- what is not used --
     "zones_of_other_kinds": "not used, because the mission uses other kinds alone ({kinds})",
-    "zones_restrict_nothing": "not used, because they restrict nothing",
+    "zones_restrict_nothing": "not used, because their kind restricts nothing",
     "zones_authorised": "not used, because the mission says that it is authorised to enter them",
     "zones_out_of_hours": "not used, because they do not apply in the hours of the mission ({hours})",
     "zones_unused_far_away": "not used: {count} further {count:zone|zones} far from the mission",

@@ -147,7 +147,7 @@ def test_limits_that_are_not_understood_count_from_the_ground_up_without_end(tmp
     assert "they count from the ground up without end: near (upperLimit 120 M QNE cannot be read" in notes(found)
     assert "not understood, and too far from the mission to matter: far away" in notes(found)
     unused = ed269(box(8.02, 47.0, **ODD), name="odd", restriction="NO_RESTRICTION")
-    assert "restrict nothing: odd" in notes(mission(tmp_path, SHUT, unused))
+    assert "restricts nothing: odd" in notes(mission(tmp_path, SHUT, unused))
 
 
 def test_a_kind_that_is_not_understood_is_no_fly_whichever_kinds_are(tmp_path: Path) -> None:
