@@ -155,7 +155,7 @@ def _require_few(file: Path) -> None:
 def _take(m: Any, read: Readings) -> dict[str, tuple[str, ...]]:
     """Keep a message; its kind and the columns that it lacks, if it cannot be used for that."""
     kind, time_s = m.get_type(), _seconds(m)
-    missing = tuple(column for column in COLUMNS.get(kind, ()) if not hasattr(m, column))
+    missing = tuple(column for column in COLUMNS.get(kind, ()) if column not in m.fmt.columns)
     if missing or time_s is None:
         return {kind: missing or ("TimeUS",)}
     if not math.isfinite(time_s):
@@ -178,7 +178,7 @@ def _take(m: Any, read: Readings) -> dict[str, tuple[str, ...]]:
 def _seconds(m: Any) -> float | None:
     """The time since boot; None if the message has none."""
     names = (("TimeUS", 1e-6), ("T", 1e-3)) if m.get_type() == "GPS" else (("TimeUS", 1e-6), ("TimeMS", 1e-3))
-    return next((float(getattr(m, name)) * unit for name, unit in names if hasattr(m, name)), None)
+    return next((float(getattr(m, name)) * unit for name, unit in names if name in m.fmt.columns), None)
 
 
 def _volt_and_ampere(m: Any) -> tuple[float, float]:

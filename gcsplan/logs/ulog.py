@@ -39,7 +39,7 @@ FIX_3D = 3
 MOST_FIELDS, MOST_FORMATS = 10_000, 2000
 """Most numbers in one message of a topic (they have some twenty), and most kinds of messages."""
 
-_FORMAT = re.compile(r"(\w+)(?:\[(\d{1,5})\])? \w+")
+_FORMAT = re.compile(r"(\w+)(?:\[(\d+)\])? \w+")
 
 
 def read_ulog(file: Path) -> FlightLog:
@@ -151,7 +151,7 @@ def _require_small(file: Path) -> None:
             content = opened.read(size)
             if kind == ord("F"):
                 name, _, fields = content.decode("utf-8", "replace").partition(":")
-                formats[name] = [(m[1], int(m[2] or 1)) for m in _FORMAT.finditer(fields)]
+                formats[name] = [(m[1], int((m[2] or "1")[:9])) for m in _FORMAT.finditer(fields)]
             if len(formats) > MOST_FORMATS:
                 raise InputError(f"has more than {MOST_FORMATS} kinds of messages: it is damaged", where=str(file))
     sizes: dict[str, int] = {}

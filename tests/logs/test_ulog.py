@@ -79,8 +79,9 @@ def test_a_file_that_is_no_px4_log_says_so(tmp_path: Path, content: bytes, words
         read_ulog(tmp_path / "a.ulg")
 
 
-def test_a_message_of_very_many_numbers_is_refused_before_it_is_read(tmp_path: Path) -> None:
-    topics = ULOG_TOPICS | {"battery_status": ("many[60000] x;", "<Q"), "many": ("more[60000] y", "<Q")}
+@pytest.mark.parametrize("fields", ["many[600] x", "float[999999999] x", "float[60000] x", "battery_status[2] x"])
+def test_a_message_of_very_many_numbers_is_refused_before_it_is_read(tmp_path: Path, fields: str) -> None:
+    topics = ULOG_TOPICS | {"battery_status": (fields, "<Q"), "many": ("more[60000] y", "<Q")}
     with pytest.raises(InputError, match="its battery_status has more than 10000 numbers: it is damaged"):
         read_ulog(ulog(tmp_path / "a.ulg", [], topics))
 
