@@ -72,6 +72,9 @@ def read_zones(
         found = read_geojson(path, whole) if kind in JSON_ZONES else _read(path, kind, data, layer)
         ignore_at = policy.place_of("ignore", "--ignore")
         found.give_sizes(radius_m, buffer_m, policy.ignore, ignore_at, skip=on_bad == "skip")
+    elif policy.ignore and not policy.by_options:
+        words = "is for files of your own; an authority's zones without a shape are left out by on_bad: skip"
+        raise InputError(words, where=f"{policy.where}.ignore")
     found.refusals[:0] = in_part
     skipped = "--on-bad skip" if policy.by_options else "on_bad: skip"
     found.settle(on_bad, f"leave it out by name ({skipped})")

@@ -8,6 +8,7 @@ from pathlib import PurePath
 
 from gcsplan.errors import Mistake
 from gcsplan.mission_file.zones.draft import ZoneDraft, one_line
+from gcsplan.mission_file.zones.file import SKIPPED
 from gcsplan.notes.note import Note
 from gcsplan.world.geodesy.frame import Frame
 from gcsplan.world.geometry.zones import Box, Zone
@@ -57,7 +58,7 @@ def unused_notes(drafts: Sequence[ZoneDraft], frame: Frame, box: Box) -> list[No
     """A note for each reason, with the name of every zone near the mission that is not used for it.
 
     Near is as far around the mission's surroundings as they extend, and at least `NAMED_WITHIN_M`; zones beyond are
-    counted.
+    counted. Zones that are not understood are named wherever they lie.
     """
     unused = [d for d in drafts if d.unused]
     if not unused:
@@ -67,7 +68,7 @@ def unused_notes(drafts: Sequence[ZoneDraft], frame: Frame, box: Box) -> list[No
     edges = frame.to_degrees(*zip(*_border(wider), strict=True))
     turned = (edges[:, 1] - frame.lon_deg + 180.0) % 360.0 - 180.0
     window = (turned.min(), edges[:, 0].min(), turned.max(), edges[:, 0].max())
-    near = [draft for draft in unused if _is_near(draft, frame, window)]
+    near = [draft for draft in unused if draft.unused == SKIPPED or _is_near(draft, frame, window)]
     notes = _reasons(near)
     if len(near) < len(unused):
         notes.append(Note("zones_unused_far_away", count=len(unused) - len(near)))

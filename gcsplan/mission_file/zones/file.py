@@ -37,6 +37,7 @@ IGNORABLE: dict[Ignorable, str] = {
 }  # fmt: skip
 """The shapes beside zones that a mission may ignore, in words."""
 
+SKIPPED = Note("zones_skipped")
 RADIUS_OF_POLYGON = Note("zone_radius_of_polygon_unread")
 BUFFER_OF_POLYGON = Note("zone_buffer_of_polygon_unread")
 
@@ -136,7 +137,7 @@ class ZoneFile:
             note = Note("zone_limits_not_understood", file=self.path.name)
             draft = replace(draft, remarks=(*draft.remarks, (note, draft.unread[0].message)))
         if draft.faults and not draft.unused and on_bad == "skip":
-            draft = replace(draft, unused=Note("zones_skipped"))
+            draft = replace(draft, unused=SKIPPED)
         return draft
 
     def give_sizes(

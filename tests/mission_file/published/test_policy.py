@@ -184,6 +184,10 @@ def test_a_mission_refuses_or_skips_what_is_not_understood(tmp_path: Path) -> No
     assert "left out, because their outlines are not understood: bent" in notes(found)
     with pytest.raises(InputError, match="zone 'lost'"):
         mission(tmp_path, LOST, entry={"on_bad": "skip"})  # nothing of the file is read
+    with pytest.raises(InputError, match=r"no_fly\[0\].ignore: is for files of your own"):
+        mission(tmp_path, SHUT, entry={"ignore": ["points"]})
+    with pytest.raises(InputError, match=r"no_fly\[0\].on_bad: belongs to a file"):
+        mission(tmp_path, no_fly=[{"center": [47.1, 8.1], "radius_m": 50, "on_bad": "skip"}])
     with pytest.raises(InputError, match=r"no_fly\[0\].on_bad: must be one of refuse, strict, skip"):
         mission(tmp_path, SHUT, entry={"on_bad": "ignore"})
 
