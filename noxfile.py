@@ -31,6 +31,7 @@ CAMPAIGNS = (
     "crash",
     "files",
     "zones",
+    "published",
     "heights",
     "hours",
     "stale",

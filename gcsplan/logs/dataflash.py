@@ -2,7 +2,8 @@
 
 BAT holds Volt and Curr of each battery instance (AP_BattMonitor; CURR before 4.0, whose whole numbers are hundredths
 until 3.3). POS is the estimator's position; GPS is used if there is none. XKF2 or NKF2 hold the wind that the estimator
-finds, which is 0 throughout if it looks for none. TimeUS is in microseconds since boot.
+finds, which is 0 throughout if it looks for none. TimeUS is in microseconds since boot; before ArduCopter 3.3 TimeMS is
+in milliseconds, but in GPS messages it is the time of the week, and T that since boot.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import io
 import math
 import mmap
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
 from pathlib import Path
 from typing import Any
@@ -27,6 +28,14 @@ MESSAGES_READ = ["BAT", "CURR", "POS", "GPS", "XKF2", "NKF2"]
 FORMAT_RECORD, FORMAT_LENGTH = 0x80, 89
 MOST_RECORDS = 10_000_000
 """Most records of a log, of all kinds: pymavlink keeps the place of each, 50 bytes. Logs of 256 MB have 6 million."""
+
+COLUMNS = {
+    "POS": ("Lat", "Lng", "Alt"),
+    "GPS": ("Lat", "Lng", "Alt"),
+    "BAT": ("Volt", "Curr"),
+    "CURR": ("Volt", "Curr"),
+}
+"""The columns that a message is read by, besides its time."""
 
 MOST_BATTERIES = 16  # AP_BATT_MONITOR_MAX_INSTANCES of ArduPilot 4.6
 MOST_COMPLAINTS = 10_000  # pymavlink makes one for each byte that it cannot read
@@ -46,6 +55,7 @@ def read_dataflash(file: Path) -> FlightLog:
     read = Readings(str(file), places=4, gps=4, wind=3, old=3, **own)
     # the reader's own clock is found by reading up to a GPS message, and is not used
     reader: Any = type("Reader", (DFReader.DFReader_binary,), {"init_clock": DFReader.DFReader_binary.init_clock_usec})
+    lacking: dict[str, tuple[str, ...]] = {}
     log: Any = object.__new__(reader)  # there, and closed, also if it cannot be made
     with _overheard() as complaints:
         try:
@@ -54,7 +64,7 @@ def read_dataflash(file: Path) -> FlightLog:
             if sum(log.counts[k] for k in kinds) > MOST_READINGS:
                 raise too_long(str(file))
             while (m := log.recv_match(type=MESSAGES_READ)) is not None:
-                _take(m, read)
+                lacking |= _take(m, read)
         except InputError:
             raise
         except Exception as error:  # the reader has no error class for a damaged file
@@ -66,7 +76,7 @@ def read_dataflash(file: Path) -> FlightLog:
         finally:
             with suppress(AttributeError):
                 log.close()
-    notes = []
+    notes: list[Note] = []
     if complaints():
         notes.append(Note("log_damaged", log=file.name))
     places = read["places"]
@@ -77,7 +87,7 @@ def read_dataflash(file: Path) -> FlightLog:
     if not batteries and len(read["old"]):
         batteries = {0: read["old"]}
     power = {which: watts_of(rows, str(file)) for which, rows in batteries.items()}
-    _require(file, places, power)
+    _require(file, places, power, lacking)
     return FlightLog.of(str(file), places, together(power), tuple(notes), wind=read["wind"])
 
 
@@ -142,10 +152,14 @@ def _require_few(file: Path) -> None:
             at += lengths.get(kind, 1)
 
 
-def _take(m: Any, read: Readings) -> None:
-    kind, time_s = m.get_type(), float(getattr(m, "TimeUS", math.nan)) * 1e-6
+def _take(m: Any, read: Readings) -> dict[str, tuple[str, ...]]:
+    """Keep a message; its kind and the columns that it lacks, if it cannot be used for that."""
+    kind, time_s = m.get_type(), _seconds(m)
+    missing = tuple(column for column in COLUMNS.get(kind, ()) if column not in m.fmt.columns)
+    if missing or time_s is None:
+        return {kind: missing or ("TimeUS",)}
     if not math.isfinite(time_s):
-        return
+        return {}
     if kind == "POS":
         read.add("places", time_s, float(m.Lat), float(m.Lng), float(m.Alt))
     elif kind == "GPS" and getattr(m, "I", 0) == 0 and getattr(m, "Status", FIX_3D) >= FIX_3D:
@@ -154,10 +168,17 @@ def _take(m: Any, read: Readings) -> None:
         which = int(getattr(m, "Inst", getattr(m, "Instance", 0)))
         if 0 <= which < MOST_BATTERIES:
             read.add(f"battery {which}", time_s, *_volt_and_ampere(m))
-    elif kind == "CURR" and hasattr(m, "Curr"):
+    elif kind == "CURR":
         read.add("old", time_s, *_volt_and_ampere(m))
     elif kind in ("XKF2", "NKF2") and int(getattr(m, "C", 0)) == 0 and hasattr(m, "VWN"):
         read.add("wind", time_s, float(m.VWE), float(m.VWN))
+    return {}
+
+
+def _seconds(m: Any) -> float | None:
+    """The time since boot; None if the message has none."""
+    names = (("TimeUS", 1e-6), ("T", 1e-3)) if m.get_type() == "GPS" else (("TimeUS", 1e-6), ("TimeMS", 1e-3))
+    return next((float(getattr(m, name)) * unit for name, unit in names if name in m.fmt.columns), None)
 
 
 def _volt_and_ampere(m: Any) -> tuple[float, float]:
@@ -167,12 +188,16 @@ def _volt_and_ampere(m: Any) -> tuple[float, float]:
     return volt, ampere
 
 
-def _require(file: Path, places: Floats, batteries: Mapping[int, Floats]) -> None:
+def _require(file: Path, places: Floats, batteries: Mapping[int, Floats], lacking: Mapping[str, Sequence[str]]) -> None:
+    def lacks(*kinds: str) -> str:
+        found = [f"{kind} has no {', '.join(lacking[kind])}" for kind in kinds if kind in lacking]
+        return f"; {'; '.join(found)}" if found else ""
+
     if not len(places):
-        raise InputError("holds no places (POS or GPS): was there a fix?", where=str(file))
+        raise InputError(f"holds no places (POS or GPS): was there a fix?{lacks('POS', 'GPS')}", where=str(file))
     if not any((rows[:, 1] > 0.0).any() for rows in batteries.values()):
         raise InputError(
-            "holds no battery current (BAT with Volt and Curr): a power module must measure it (BATT_MONITOR 4), and "
-            "LOG_BITMASK must hold the battery",
+            "holds no battery current (BAT or CURR with Volt and Curr): a power module must measure it (BATT_MONITOR "
+            f"4), and LOG_BITMASK must hold the battery{lacks('BAT', 'CURR')}",
             where=str(file),
         )

@@ -19,6 +19,9 @@ LEAST_POINTS = 20
 LEAST_V, MOST_V, LEAST_A, MOST_A, LEAST_W, MOST_W = 2.0, 1000.0, 0.02, 1000.0, 1.0, 100_000.0
 """Between these lie voltage, current and power of the aircraft that gcsplan plans for, in the middle of a flight."""
 
+MOST_A_PER_V = 15.0
+"""No aircraft flies with so many ampere for each volt, in the middle of a flight: most have 1 to 5."""
+
 MOST_WIND_M_S = 60.0
 MOST_READINGS = 2_000_000
 """Most readings of one log, of all kinds together: 5 h of place and battery at 50 Hz."""
@@ -124,7 +127,8 @@ def require_power(watts: Floats, name: str) -> None:
 def watts_of(readings: NumberRows, name: str) -> Floats:
     """(N, 2) seconds and watts of readings of (seconds, volt, ampere).
 
-    Raises InputError if voltage or current is not an aircraft battery's: then a unit is mistaken.
+    Raises InputError if voltage or current is not an aircraft battery's, or the current is too much for the voltage:
+    then a unit is mistaken.
     """
     rows = np.array(readings, dtype=np.float64).reshape(-1, 3)
     for what, unit, column, least, most in (("voltage", "V", 1, LEAST_V, MOST_V), ("current", "A", 2, LEAST_A, MOST_A)):
@@ -136,6 +140,14 @@ def watts_of(readings: NumberRows, name: str) -> Floats:
                 f"battery's: it is in another unit, such as hundredths or thousandths; convert it",
                 where=name,
             )
+    used = rows[np.isfinite(rows).all(axis=1) & (rows[:, 2] > 0.0), 1:]
+    volt, amp = np.median(used, axis=0).tolist() if len(used) else (1.0, 0.0)
+    if amp > MOST_A_PER_V * volt:
+        raise InputError(
+            f"has a current of {amp:.3g} A at {volt:.3g} V, and more than {MOST_A_PER_V:g} A for each volt are no "
+            "aircraft's: one of both is in another unit, such as hundredths or thousandths; convert it",
+            where=name,
+        )
     return np.column_stack([rows[:, 0], rows[:, 1] * rows[:, 2]])
 
 

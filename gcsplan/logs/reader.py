@@ -1,4 +1,4 @@
-"""Reader for flight logs of all supported kinds: ArduPilot's .bin, MAVLink .tlog, CSV."""
+"""Reader for flight logs of all supported kinds: ArduPilot's .bin, PX4's .ulg, MAVLink .tlog, CSV."""
 
 from __future__ import annotations
 
@@ -10,13 +10,14 @@ from gcsplan.logs.csv_log import read_csv
 from gcsplan.logs.dataflash import read_dataflash
 from gcsplan.logs.flight_log import FlightLog
 from gcsplan.logs.tlog import read_telemetry
+from gcsplan.logs.ulog import read_ulog
 
 MOST_LOG_BYTES = 256_000_000
 """Most bytes of a log, whatever its kind."""
 
 
 def read_log(file: Path, *, columns: Mapping[str, str] | None = None, sysid: int | None = None) -> FlightLog:
-    """The flight in ``file``: ArduPilot's .bin (or .BIN; .log is refused), a .tlog, or CSV, by its ending.
+    """The flight in ``file``: ArduPilot's .bin (or .BIN; .log is refused), PX4's .ulg, a .tlog, or CSV, by its ending.
 
     ``columns`` are the names of a CSV's columns; ``sysid`` selects the vehicle of a .tlog. Raises InputError with a
     cure.
@@ -41,8 +42,9 @@ def read_log(file: Path, *, columns: Mapping[str, str] | None = None, sysid: int
         return read_dataflash(file)
     if kind in (".tlog", ".rlog"):
         return read_telemetry(file, sysid)
+    if kind == ".ulg":
+        return read_ulog(file)
     cure = {
-        ".ulg": "PX4's logs: make CSV of vehicle_global_position and battery_status with ulog2csv, join them by time",
         ".log": "a text log: give the .bin that it was made from",
     }.get(kind, f"the ending {kind or '(none)'} is not known")
-    raise InputError(f"{cure}. Read are ArduPilot's .bin, MAVLink .tlog, and .csv", where=str(file))
+    raise InputError(f"{cure}. Read are ArduPilot's .bin, PX4's .ulg, MAVLink .tlog, and .csv", where=str(file))

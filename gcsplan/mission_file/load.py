@@ -16,7 +16,13 @@ from typing import Any, get_args
 from gcsplan.errors import InputError, Mistake
 from gcsplan.mavlink.mission.mission import AltitudeFrame
 from gcsplan.mission_file.published.times import Hours, hours_of, texts_of
-from gcsplan.mission_file.published.unused import faults_near, left_out_by_hours, unused_notes, used
+from gcsplan.mission_file.published.unused import (
+    faults_near,
+    left_out_by_hours,
+    not_understood_far,
+    unused_notes,
+    used,
+)
 from gcsplan.mission_file.request import (
     ArrivalRequest,
     Content,
@@ -209,6 +215,7 @@ class _MissionReading:
             here = self._around(terrain, frame, box)
             if here is not None:
                 problems += faults_near(placed, box)
+                self.notes += not_understood_far(placed, far, box)
                 self.notes += unused_notes(published, frame, box)
                 site = MissionPlane(here, frame, box, placed, terminals, set(places), self.local)
                 ground = site.load(problems)

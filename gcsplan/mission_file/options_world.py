@@ -19,8 +19,14 @@ from gcsplan.errors import InputError, Mistake
 from gcsplan.mavlink.mission.return_parameters import ReturnRoute
 from gcsplan.mission_file.load import TERRAIN_ERROR_M
 from gcsplan.mission_file.published.policy import Policy
-from gcsplan.mission_file.published.times import Hours, hours_of
-from gcsplan.mission_file.published.unused import faults_near, left_out_by_hours, unused_notes, used
+from gcsplan.mission_file.published.times import hours_of
+from gcsplan.mission_file.published.unused import (
+    faults_near,
+    left_out_by_hours,
+    not_understood_far,
+    unused_notes,
+    used,
+)
 from gcsplan.mission_file.scene import make_spec, settle_zones
 from gcsplan.mission_file.values.errors import read_section
 from gcsplan.mission_file.values.schema import LimitKeys, TerrainKeys, VehicleKeys
@@ -34,6 +40,7 @@ from gcsplan.mission_file.zones.draft import (
     zone_notes,
     zones_sha256,
 )
+from gcsplan.mission_file.zones.file import Ignorable, OnBad
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.airspace import Airspace
@@ -53,7 +60,7 @@ KEY_OPTIONS = {
     "descent_m_s": "--descent-rate", "dem": "--dem", "vertical_datum": "--vertical-datum", "autopilot": "--autopilot",
     "geoid_grid": "--geoid-grid", "obstacle_height_m": "--obstacle-height", "start": "--home",
     "rtl_rel_home_m": "--rtl-altitude", "return_route": "--return-route", "crs": "--crs",
-    "height_unit": "--height-unit", "nodata": "--nodata",
+    "height_unit": "--height-unit", "nodata": "--nodata", "on_bad": "--on-bad", "ignore": "--ignore",
 }  # fmt: skip
 """The option for each key of a mission file."""
 
@@ -63,7 +70,7 @@ class WorldOptions:
     """The values of the options, by the mission file's names. Paths are as written; None means not given.
 
     ``home`` (latitude, longitude) is the home of every file, ``at`` says when they fly, and ``notes`` say how options
-    were read.
+    were read. ``on_bad`` and ``ignore`` are the rules for all files of zones.
     """
 
     terrain: Mapping[str, object] = field(default_factory=dict)
@@ -76,6 +83,8 @@ class WorldOptions:
     terrain_error_m: float = TERRAIN_ERROR_M
     notes: tuple[Note, ...] = ()
     at: tuple[str, ...] | None = None
+    on_bad: OnBad | None = None
+    ignore: tuple[Ignorable, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +103,8 @@ class OpenWorld:
         self.options = options
         self.notes: list[Note] = [*options.notes]
         hours = hours_of(None, None, "--at", problems, instead=options.at)
-        self._drafts = _drafts(options.zones, problems, self.notes, hours)
+        policy = Policy(hours=hours, where="--zones", on_bad=options.on_bad, ignore=options.ignore)
+        self._drafts = _drafts(options.zones, problems, self.notes, policy)
         self.hours = hours if left_out_by_hours(self._drafts) else None
         self._terrain: OpenTerrain | None = None
         self._made: dict[str, Vehicle] = {}
@@ -187,7 +197,8 @@ class OpenWorld:
             problems += own
         if problems:
             raise InputError.of([_renamed(p) for p in problems])
-        notes = [*self.notes, *notes_on(surface.info), *zone_notes(placed), *unused_notes(self._drafts, frame, box)]
+        notes = [*self.notes, *notes_on(surface.info), *zone_notes(placed), *not_understood_far(placed, far, box)]
+        notes += unused_notes(self._drafts, frame, box)
         if far:
             notes.append(Note("zones_left_out", count=len(far)))
         inputs = {k: v for k, v in surface.info.items() if k not in ("notes", "source")}
@@ -204,12 +215,12 @@ class OpenWorld:
         return low[0] - margin, low[1] - margin, high[0] + margin, high[1] + margin
 
 
-def _drafts(files: Sequence[str], problems: list[Mistake], notes: list[Note], hours: Hours | None) -> list[ZoneDraft]:
+def _drafts(files: Sequence[str], problems: list[Mistake], notes: list[Note], policy: Policy) -> list[ZoneDraft]:
     """The zones of all files, each with a unique name; those are not used that do not apply in the hours."""
     drafts: list[ZoneDraft] = []
     for file in files:
         try:
-            found = read_zones(Path(file), where="--zones", policy=Policy(hours=hours, where="--zones"))
+            found = read_zones(Path(file), where="--zones", policy=policy)
         except InputError as why:
             problems += why.problems
             continue

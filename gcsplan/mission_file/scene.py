@@ -219,15 +219,16 @@ def make_zones(
         return []
     if keys.file is not None:
         return _zones_of_file(keys, keys.file, where, folder, problems, notes, hours)
-    for key in sorted(OF_FILES & keys.given.keys()):
-        problems.append(Mistake(f"{where}.{key}", "belongs to a file of an authority"))
+    for key in sorted({"on_bad", "ignore", *OF_FILES} & keys.given.keys()):
+        whose = " of an authority" if key in OF_FILES else ""
+        problems.append(Mistake(f"{where}.{key}", f"belongs to a file{whose}"))
     return _own_zone(keys, where, fallback, problems, notes, local=local)
 
 
 def _zones_of_file(
     keys: ZoneKeys, file: str, where: str, folder: Path, problems: list[Mistake], notes: list[Note], hours: Hours | None
 ) -> list[ZoneDraft]:
-    others = sorted(keys.given.keys() - {"file", "layer", *SIZE_KEYS, *OF_FILES})
+    others = sorted(keys.given.keys() - {"file", "layer", "on_bad", "ignore", *SIZE_KEYS, *OF_FILES})
     words = "stands in the file itself, in a feature's properties; leave it out here"
     problems += [Mistake(f"{where}.{k}", words) for k in others]
     sizes = [(getattr(keys, size), f"{where}.{size}") for size in SIZE_KEYS if getattr(keys, size) is not None]
@@ -239,7 +240,9 @@ def _zones_of_file(
 
     kinds = None if keys.kinds is None else tuple(keys.kinds)
     try:
-        policy = Policy(kinds, tuple(keys.authorised), hours, keys.flight_level_error_m, where)
+        policy = Policy(
+            kinds, tuple(keys.authorised), hours, keys.flight_level_error_m, where, keys.on_bad, tuple(keys.ignore)
+        )
         found = read_zones(
             folder / file, where=f"{where}.file", radius_m=keys.radius_m, buffer_m=keys.buffer_m, layer=keys.layer,
             policy=policy,

@@ -10,17 +10,26 @@ from pathlib import Path
 from typing import Any
 
 from gcsplan.errors import InputError
-from gcsplan.mission_file.published.ed269 import is_ed269, read_ed269
+from gcsplan.mission_file.published.ed269 import is_ed269, is_ed269_geojson, read_ed269, read_ed269_geojson
 from gcsplan.mission_file.published.ed318 import is_ed318, read_ed318
 from gcsplan.mission_file.published.openaip import is_openaip, read_openaip
 from gcsplan.mission_file.published.openair import read_openair
 from gcsplan.mission_file.published.policy import Policy
 from gcsplan.mission_file.zones.contents import load_json, require_wgs84, sent_in_part, unpack
 from gcsplan.mission_file.zones.csv import read_csv
-from gcsplan.mission_file.zones.file import ZoneFile
+from gcsplan.mission_file.zones.fence import is_fence, read_fence
+from gcsplan.mission_file.zones.file import OnBad, ZoneFile
 from gcsplan.mission_file.zones.geojson import read_geojson
 from gcsplan.mission_file.zones.kml import read_kml
-from gcsplan.world.terrain.input_files import JSON_ZONES, OPENAIR_ZONES, VECTOR_ZONES, ZONE_FILES, absent, tell_file
+from gcsplan.world.terrain.input_files import (
+    FENCE_ZONES,
+    JSON_ZONES,
+    OPENAIR_ZONES,
+    VECTOR_ZONES,
+    ZONE_FILES,
+    absent,
+    tell_file,
+)
 
 MAX_ZONE_BYTES = 20_000_000
 """Most bytes of a file, and of what is unpacked from one."""
@@ -44,8 +53,8 @@ def read_zones(
     Mistakes in single features are collected in ``problems``; a file that cannot be read at all raises InputError.
     """
     kind = path.suffix.lower()
-    if kind not in (*ZONE_FILES, *OPENAIR_ZONES):
-        known = f"{', '.join(ZONE_FILES)} and OpenAir ({', '.join(OPENAIR_ZONES)}) files"
+    if kind not in (*ZONE_FILES, *FENCE_ZONES, *OPENAIR_ZONES):
+        known = f"{', '.join((*ZONE_FILES, *FENCE_ZONES))} and OpenAir ({', '.join(OPENAIR_ZONES)}) files"
         raise InputError(f"zones are read from {known}, given {path.name}", where=where)
     if layer is not None and kind not in VECTOR_ZONES:
         raise InputError(f"a {kind} file has no layers; leave `layer` out", where=where)
@@ -54,22 +63,29 @@ def read_zones(
     whole = load_json(path, data) if kind in JSON_ZONES else None
     require_wgs84(whole, path, json_format(whole)[0])
     in_part = sent_in_part(whole, path)
-    published = read_published(path, data, whole, policy)
-    if published is not None:
-        published.problems[:0] = in_part
-        return published
-    for key in policy.keys:
-        words = f"{path.name} is no file of an authority (OpenAir, ED-269, ED-318, openAIP), and has no {key}"
-        raise InputError(words, where=f"{policy.where}.{key}")
-    found = read_geojson(path, whole) if kind in JSON_ZONES else _read(path, kind, data, layer)
-    found.problems[:0] = in_part
-    found.give_sizes(radius_m, buffer_m)
+    found = read_published(path, data, whole, policy)
+    on_bad: OnBad = policy.on_bad or ("refuse" if found is None else "strict")
+    if found is None:
+        for key in policy.keys:
+            words = f"{path.name} is no file of an authority (OpenAir, ED-269, ED-318, openAIP), and has no {key}"
+            raise InputError(words, where=f"{policy.where}.{key}")
+        found = read_geojson(path, whole) if kind in JSON_ZONES else _read(path, kind, data, layer)
+        ignore_at = policy.place_of("ignore", "--ignore")
+        found.give_sizes(radius_m, buffer_m, policy.ignore, ignore_at, skip=on_bad == "skip")
+    elif policy.ignore and not policy.by_options:
+        words = "is for files of your own; an authority's zones without a shape are left out by on_bad: skip"
+        raise InputError(words, where=f"{policy.where}.ignore")
+    found.refusals[:0] = in_part
+    skipped = "--on-bad skip" if policy.by_options else "on_bad: skip"
+    found.settle(on_bad, f"leave it out by name ({skipped})")
     return found
 
 
 def _read(path: Path, kind: str, data: bytes, layer: str | None) -> ZoneFile:
     if kind == ".kmz":
         return read_kml(path, unpack(path, data, [".kml"], MAX_ZONE_BYTES)[".kml"])
+    if kind in (*FENCE_ZONES, *OPENAIR_ZONES):
+        return read_fence(path, data)
     if kind == ".csv":
         return read_csv(path, data)
     if kind in VECTOR_ZONES:
@@ -96,6 +112,7 @@ def _bytes(path: Path, where: str) -> bytes:
 
 _JSON_FORMATS = (
     ("ED-269", is_ed269, read_ed269), ("ED-318", is_ed318, read_ed318), ("openAIP's export", is_openaip, read_openaip),
+    ("GeoJSON with the properties of ED-269", is_ed269_geojson, read_ed269_geojson),
 )  # fmt: skip
 
 
@@ -106,7 +123,7 @@ def json_format(whole: Any) -> tuple[str, Callable[[Path, Any, Policy], ZoneFile
 
 def read_published(path: Path, data: bytes, whole: Any, policy: Policy) -> ZoneFile | None:
     """The zones of a published file; None if it has none of these formats. ``whole`` is what its JSON holds."""
-    if path.suffix.lower() in OPENAIR_ZONES:
+    if path.suffix.lower() in OPENAIR_ZONES and not is_fence(data):
         return read_openair(path, data, policy)
     read = json_format(whole)[1]
     return None if read is None else read(path, whole, policy)

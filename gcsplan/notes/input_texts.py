@@ -134,9 +134,8 @@ INPUT_TEXTS = {
         "limits without a unit or a reference are read as OpenAir's programs do, in feet above sea level"
     ),
     "zone_limits_move": ("the limits of these zones move: at that end they count from the ground up, or without end"),
-    "zone_limits_not_understood": (
-        "the limits of these zones are not understood: they count from the ground up without end"
-    ),
+    "zone_limits_empty": "an empty AL or AH is no limit: these zones count from the ground up, or without end",
+    "zone_limits_not_understood": ("these zones are understood in part: they count from the ground up without end"),
     "zone_corner_altitudes_unread": "the altitudes of corners are not read as limits",
     "zone_drawn_altitudes_unread": "the drawn altitudes are not read as limits",
     "zone_ceiling_as_drawn": (
@@ -178,15 +177,20 @@ INPUT_TEXTS = {
     "line_of_file": "line {line}: {text}",
     # -- what is not used --
     "zones_of_other_kinds": "not used, because the mission uses other kinds alone ({kinds})",
-    "zones_restrict_nothing": "not used, because they restrict nothing",
+    "zones_restrict_nothing": "not used, because their kind restricts nothing",
     "zones_authorised": "not used, because the mission says that it is authorised to enter them",
     "zones_out_of_hours": "not used, because they do not apply in the hours of the mission ({hours})",
     "zones_unused_far_away": "not used: {count} further {count:zone|zones} far from the mission",
     "zones_left_out": "left out: {count} {count:zone|zones} of files, too far away to matter",
     "zone_not_understood": "{where}: {why}",
+    "zones_not_understood_far": "not understood, and too far from the mission to matter",
+    "zone_skipped": "left out, because it is not understood: {where}: {why}",
+    "zones_skipped": "left out, because their outlines are not understood",
+    "shapes_ignored": "left out, because these are {kind}",
     # -- how a file was read --
     "holes_are_no_fly": "{count} {count:hole|holes} in polygons counted as no-fly",
     "terrain_records_unused": "not used, because they draw terrain: {records}",
+    "fence_return_points_unused": "not used: {count} {count:point|points} to which a fence sends the aircraft",
     "tracks_unused": "not used: {count} {count:track or way point|tracks and way points} of a mission",
     "pictures_unused": "not used: {kinds}",
     "gdal_warns": "GDAL warns: {warning}",
@@ -252,6 +256,7 @@ INPUT_TEXTS = {
     ),
     # -- flight logs and on the energy model that is fitted to them --
     "log_damaged": "{log} is damaged in places, which were passed over",
+    "places_of_receiver": "no vehicle_global_position, so the receiver's own places were taken, {topic}",
     "places_of_gps": "no POS messages, so the GPS's own places were taken",
     "power_of_system_status": "no BATTERY_STATUS, so SYS_STATUS was taken",
     "lines_passed_over": "passed over {count} {count:line|lines} without numbers",

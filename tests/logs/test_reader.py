@@ -17,7 +17,7 @@ def test_files_that_are_none_say_so(tmp_path: Path) -> None:
     (tmp_path / "x.ulg").write_bytes(b"ULog")
     (tmp_path / "x.tlog").write_bytes(bytes(range(0, 128, 2)))
     for name, words in (
-        ("gone.bin", "no such file"), ("x.bin", "A3 95"), ("x.ulg", "ulog2csv"), ("x.tlog", "no places|damaged"),
+        ("gone.bin", "no such file"), ("x.bin", "A3 95"), ("x.ulg", "is no PX4 log"), ("x.tlog", "no places|damaged"),
         (".", "folder"),
     ):  # fmt: skip
         with pytest.raises(InputError, match=words):

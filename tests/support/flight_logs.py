@@ -91,6 +91,52 @@ def tlog(path: Path, *, sysids: Sequence[int] = (1,), status: bool = False, batt
     return path
 
 
+# A ULog is messages behind its head: F describes a topic, A subscribes to it, D is one of its messages.
+ULOG_TOPICS = {
+    "battery_status": ("float voltage_v;float current_a;bool connected", "<Qff?"),
+    "vehicle_global_position": ("double lat;double lon;float alt", "<Qddf"),
+    "vehicle_gps_position": ("int32_t lat;int32_t lon;int32_t alt;uint8_t fix_type", "<QiiiB"),
+    "wind": ("float windspeed_north;float windspeed_east", "<Qff"),
+}
+
+
+def ulog(
+    path: Path, rows: Sequence[tuple[str, int, tuple[float, ...]]], topics: dict[str, tuple[str, str]] = ULOG_TOPICS
+) -> Path:
+    """A log of (topic, instance, values after the microseconds that are the first of them)."""
+    out = bytearray(b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0))
+
+    def message(kind: str, content: bytes) -> None:
+        out.extend(struct.pack("<HB", len(content), ord(kind)) + content)
+
+    message("B", bytes(40))
+    for name, (fields, _) in topics.items():
+        message("F", f"{name}:uint64_t timestamp;{fields};".encode())
+    ids: dict[tuple[str, int], int] = {}
+    for name, instance, values in rows:
+        if (name, instance) not in ids:
+            ids[name, instance] = len(ids)
+            message("A", struct.pack("<BH", instance, ids[name, instance]) + name.encode())
+        message("D", struct.pack("<H", ids[name, instance]) + struct.pack(topics[name][1], *values))
+    path.write_bytes(out)
+    return path
+
+
+def ulog_rows(batteries: int = 1, *, gps: bool = False) -> list[tuple[str, int, tuple[float, ...]]]:
+    t, place, watts = flown(seed=10)
+    lat, lon = degrees(place)
+    rows: list[tuple[str, int, tuple[float, ...]]] = []
+    for i, s in enumerate(t):
+        us, up = int(s * 1e6) + 1, 300.0 + float(place[i, 2])
+        whole = (us, round(lat[i] * 1e7), round(lon[i] * 1e7), round(up * 1e3), 3)
+        rows.append(
+            ("vehicle_gps_position", 0, whole) if gps else ("vehicle_global_position", 0, (us, lat[i], lon[i], up))
+        )
+        for b in range(batteries):
+            rows.append(("battery_status", b, (us, 22.0, watts[i] / 22.0 / batteries, True)))
+    return rows
+
+
 # A DataFlash log is messages behind A3 95: FMT (128) describes each type by its size, name, format and columns.
 FORMATS = {
     "BAT": (129, "QBffff", "TimeUS,Inst,Volt,Curr,CurrTot,EnrgTot", "<QBffff"),

@@ -17,6 +17,7 @@ from gcsplan.mission_file.published.times import hours_of, texts_of
 from gcsplan.mission_file.published.unused import listed
 from gcsplan.mission_file.zone_reader import read_zones
 from gcsplan.mission_file.zones.draft import ZoneDraft, zone_notes
+from gcsplan.mission_file.zones.file import Ignorable, OnBad
 from gcsplan.notes.note import Note
 from gcsplan.world.geodesy.frame import Frame
 from gcsplan.world.geometry.zones import Level
@@ -57,17 +58,25 @@ class ListedZone:
                 "source": self.source}  # fmt: skip
 
 
-def list_zones(files: Sequence[Path], at: str | None = None) -> tuple[list[ListedZone], list[Note]]:
+def list_zones(
+    files: Sequence[Path], at: str | None = None, *, on_bad: OnBad | None = None, ignore: Sequence[Ignorable] = ()
+) -> tuple[list[ListedZone], list[Note]]:
     """The no-fly zones of mission files (.yaml) and of zone files, and the notes on them and others. Raises InputError.
 
-    ``at``: zones that do not apply then are not listed, but named.
+    ``at``: zones that do not apply then are not listed, but named. ``on_bad`` and ``ignore`` are the rules for zone
+    files; a mission file has its own.
     Zones that are too far from a mission to matter are listed, too: a mission's places are not read.
     """
     drafts: list[ZoneDraft] = []
     notes: list[Note] = []
     wrong: list[Mistake] = []
     texts = texts_of(at)
-    policy = Policy(hours=hours_of(None, None, "--at", wrong, instead=texts))
+    hours = hours_of(None, None, "--at", wrong, instead=texts)
+    policy = Policy(hours=hours, where="--zones", on_bad=on_bad, ignore=tuple(ignore))
+    mission = next((file for file in files if file.suffix.lower() in MISSIONS), None)
+    if mission is not None and (on_bad or ignore):
+        option = "--on-bad" if on_bad else "--ignore"
+        wrong.append(Mistake(option, f"is for files of zones; write it into {mission}, beside each `file`"))
     if wrong:
         raise InputError.of(wrong)
     for file in files:

@@ -72,6 +72,25 @@ ListZonesOption = Annotated[
         "--list-zones", help="Show each zone as it was read: shape, size, floor, ceiling. Nothing else is done."
     ),
 ]
+OnBadOption = Annotated[
+    str | None,
+    typer.Option(
+        "--on-bad",
+        metavar="RULE",
+        autocompletion=completion.words("refuse", "strict", "skip"),
+        help="Zones that are not understood: refuse; strict (they count as large as they may be); skip (left out by "
+        "name). If absent, own files refuse, an authority's are strict.",
+    ),
+]
+IgnoreOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--ignore",
+        metavar="WHAT",
+        autocompletion=completion.words("points", "lines", "empty"),
+        help="Shapes beside zones to leave out by name: points and lines without a size, empty; may be repeated.",
+    ),
+]
 AtOption = Annotated[
     str | None,
     typer.Option(

@@ -13,10 +13,12 @@ from gcsplan.cli.arguments.options import (
     ClusterOption,
     DatumOption,
     HeightUnitOption,
+    IgnoreOption,
     JobsOption,
     JsonOption,
     ListZonesOption,
     NodataOption,
+    OnBadOption,
     RequireWayHomeOption,
     UnitsChoice,
     UnitsOption,
@@ -36,6 +38,7 @@ if TYPE_CHECKING:
     from gcsplan.mavlink.mission.return_parameters import ReturnRoute
     from gcsplan.mission_file.options_world import WorldOptions
     from gcsplan.mission_file.values.places import Degrees
+    from gcsplan.mission_file.zones.file import Ignorable, OnBad
     from gcsplan.units import Units
 
 Number = float | None
@@ -78,6 +81,8 @@ def check(
             help="No-fly zones: .geojson, .kml, .kmz, .gpkg, .csv, …, or a state's; may be repeated.",
         ),
     ] = None,
+    on_bad: OnBadOption = None,
+    ignore: IgnoreOption = None,
     min_agl: Annotated[Number, typer.Option(metavar="M", help="Lowest height above ground.")] = None,
     max_agl: Annotated[Number, typer.Option(metavar="M", help="Highest height above ground.")] = None,
     max_amsl: Annotated[Number, typer.Option(metavar="M", help="Highest altitude above sea level.")] = None,
@@ -153,13 +158,18 @@ def check(
     if list_zones:
         from gcsplan.cli.commands.zones import show_zones
 
-        named = [Path(f) for f in (*files, *(zones or [])) if Path(f).suffix.lower() not in (".waypoints", ".plan")]
+        named = [Path(f) for f in files if Path(f).suffix.lower() not in (".waypoints", ".plan")]
+        named += [Path(f) for f in zones or []]
+        if not named:  # a fence may be in one
+            named = [Path(f) for f in files if Path(f).suffix.lower() == ".waypoints"]
         if not named:
             raise UsageError("--list-zones: of which zones? Give a mission file (.yaml) or a file of zones, too")
-        return show_zones(named, units_of(units), as_json=as_json, at=at)
+        rule, ignored = _rule(on_bad), _ignored(ignore)
+        return show_zones(named, units_of(units), as_json=as_json, at=at, on_bad=rule, ignore=ignored)
     given: dict[str, object] = {
         "--dem": dem, **as_options(terrain_keys(vertical_datum, height_unit, nodata)), "--geoid-grid": geoid_grid,
-        "--crs": crs, "--obstacle-height": obstacle_height, "--zones": zones, "--min-agl": min_agl,
+        "--crs": crs, "--obstacle-height": obstacle_height, "--zones": zones, "--on-bad": on_bad,
+        "--ignore": ignore, "--min-agl": min_agl,
         "--max-agl": max_agl, "--max-amsl": max_amsl, "--clearance": clearance, "--track-error": track_error,
         "--altitude-error": altitude_error, "--max-climb": max_climb, "--max-descent": max_descent,
         "--autopilot": autopilot, "--home": home, "--speed": speed, "--climb-rate": climb_rate,
@@ -192,6 +202,28 @@ def check(
     _say_all(batch, units_of(units))
     failing = [f for c in batch.checked if (f := checking.failing_of(c, allow_unjudged=allow_unjudged)) is not None]
     raise typer.Exit(worst_of({*(f.code for f in failing), *(error.exit_code for _, error in batch.unreadable)}))
+
+
+def _rule(word: object) -> OnBad | None:
+    from typing import get_args
+
+    from gcsplan.mission_file.zones.file import OnBad
+
+    found: OnBad | None = next((rule for rule in get_args(OnBad) if rule == word), None)
+    if word is not None and found is None:
+        raise UsageError(f"--on-bad {word}: give one of {', '.join(get_args(OnBad))}")
+    return found
+
+
+def _ignored(words: object) -> tuple[Ignorable, ...]:
+    """The shapes that `--ignore` names, each word or several with commas."""
+    from gcsplan.mission_file.zones.file import IGNORABLE
+
+    given = [word.strip() for text in (words if isinstance(words, list) else ()) for word in str(text).split(",")]
+    for word in given:
+        if word not in IGNORABLE:
+            raise UsageError(f"--ignore {word}: give one of {', '.join(IGNORABLE)}")
+    return tuple(kind for kind in IGNORABLE if kind in given)
 
 
 def _named(argument: str) -> list[str]:
@@ -262,6 +294,8 @@ def world_options(given: dict[str, object], at: str | None = None) -> WorldOptio
         rtl_rel_home_m=rtl if isinstance(rtl, float) else None,
         return_route=_route(route),
         at=texts_of(at),
+        on_bad=_rule(given.get("--on-bad")),
+        ignore=_ignored(given.get("--ignore")),
         notes=() if home is None or not home.note else (home.note.of(place="--home"),),
     )
 

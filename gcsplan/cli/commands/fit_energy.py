@@ -14,7 +14,8 @@ from gcsplan.errors import CheckFailed, UsageError
 
 def fit_energy(
     logs: Annotated[
-        list[Path], typer.Argument(metavar="LOG...", help="ArduPilot .bin, MAVLink .tlog or .csv; several are one fit.")
+        list[Path],
+        typer.Argument(metavar="LOG...", help="ArduPilot .bin, PX4 .ulg, MAVLink .tlog or .csv; several are one fit."),
     ],
     csv_columns: Annotated[
         str,

@@ -10,11 +10,15 @@ from gcsplan.cli.process.exit import emit, printable
 
 if TYPE_CHECKING:
     from gcsplan.app.output.zones import ListedZone
+    from gcsplan.mission_file.zones.file import Ignorable, OnBad
     from gcsplan.units import Unit, Units
     from gcsplan.world.geometry.zones import Level
 
 
-def show_zones(files: Sequence[Path], units: Units, *, as_json: bool, at: str | None = None) -> None:
+def show_zones(
+    files: Sequence[Path], units: Units, *, as_json: bool, at: str | None = None, on_bad: OnBad | None = None,
+    ignore: Sequence[Ignorable] = (),
+) -> None:  # fmt: skip
     """Print the zones of mission files and zone files, a row for each. Raises InputError."""
     from rich.markup import escape
 
@@ -23,7 +27,7 @@ def show_zones(files: Sequence[Path], units: Units, *, as_json: bool, at: str | 
     from gcsplan.figures import counted
     from gcsplan.notes.note import in_json
 
-    zones, notes = list_zones(files, at)
+    zones, notes = list_zones(files, at, on_bad=on_bad, ignore=ignore)
     if as_json:
         emit({"zones": [zone.as_dict() for zone in zones], **in_json("notes", notes)})
         return

@@ -106,6 +106,17 @@ def parse_waypoints(text: str, *, autopilot: Autopilot, where: str, home_hint: H
     ``where`` names the file in messages. ``home_hint`` is the home for a file that has none (first seq 1, header 120,
     or a home row of zeros). Raises InputError with the first twenty mistakes, each with its line.
     """
+    version, rows = _read_rows(text, where)
+    return _mission(rows, version == "110", autopilot, where, home_hint)
+
+
+def raw_items(text: str, where: str) -> list[tuple[int, RawItem]]:
+    """The line and the item of every row in ``text``, of a list of any kind, home too; see `parse_waypoints`."""
+    return [(row.line, row.raw) for row in _read_rows(text, where)[1]]
+
+
+def _read_rows(text: str, where: str) -> tuple[str, list[_Row]]:
+    """The version of the format, and the rows."""
     if len(text) > MAX_FILE_BYTES:
         raise InputError(f"a mission file of more than {MAX_FILE_BYTES // 10**6} MB is not read", where=where)
     lines = io.StringIO(text.removeprefix("\ufeff"), newline=None)
@@ -119,7 +130,7 @@ def parse_waypoints(text: str, *, autopilot: Autopilot, where: str, home_hint: H
     rows = list(_rows(lines, where, problems))
     if problems:
         raise InputError.of(problems, headline=f"{where} is damaged" if len(problems) > 1 else "")
-    return _mission(rows, header[2] == "110", autopilot, where, home_hint)
+    return header[2], rows
 
 
 class _Row:
@@ -236,7 +247,7 @@ def _mission(rows: list[_Row], has_home: bool, autopilot: Autopilot, where: str,
         what = "rally points" if items[0].command == RALLY_POINT else "a fence"
         raise InputError(
             f"the file holds {what} ({len(items)} items), as Mission Planner saves them, and no mission: give the "
-            "mission's own file; no-fly zones are read from GeoJSON, KML and others",
+            "mission's own file; a fence's areas are no-fly with check --zones FILE, or no_fly: [{file: FILE}]",
             where=where,
         )
     first_seq = 1 if autopilot.is_ardupilot else 0

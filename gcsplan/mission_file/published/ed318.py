@@ -10,11 +10,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from gcsplan.errors import Mistake
 from gcsplan.mission_file.published.ed269 import published
 from gcsplan.mission_file.published.members import (
+    MOST_GEOMETRIES,
     MemberError,
     add_polygons,
-    number_or_none,
+    limit_of,
     position,
     read_features,
     unread,
@@ -28,7 +30,6 @@ ZONE_TYPES = ("USPACE", "PROHIBITED", "REQ_AUTHORIZATION", "CONDITIONAL", "NO_RE
 REQUIRED = frozenset({"identifier", "country", "type", "variant"})
 GEOMETRY_MEMBERS = frozenset({"type", "coordinates", "layer", "bbox"})
 LAYER_MEMBERS = frozenset({"lower", "lowerReference", "upper", "upperReference", "uom"})
-MOST_GEOMETRIES = 1000
 
 
 def is_ed318(whole: Any) -> bool:
@@ -68,7 +69,9 @@ def _feature(file: AirspaceFile, feature: Any, where: str, fallback: str) -> Non
     if isinstance(geometry, dict) and geometry.get("type") == "GeometryCollection":
         whole = geometry.get("geometries")
         if not isinstance(whole, list) or not 0 < len(whole) <= MOST_GEOMETRIES:
-            raise MemberError(f"zone {zone.name[:60]!r}: a GeometryCollection has geometries, given {shown(whole)}")
+            words = f"zone {zone.name[:60]!r}: a GeometryCollection has geometries, given {shown(whole)}"
+            file.fault(where, words, zone)
+            return
     for i, one in enumerate(whole):
         part = zone.name if len(whole) == 1 else f"{zone.name}/{i + 1}"
         at = f"{where}.geometry" if one is geometry else f"{where}.geometry.geometries[{i}]"
@@ -77,7 +80,7 @@ def _feature(file: AirspaceFile, feature: Any, where: str, fallback: str) -> Non
         try:
             _geometry(file, zone, part, one, layer, at)
         except MemberError as why:
-            file.fault(at, f"zone {zone.name[:60]!r}: {why}")
+            file.fault(at, f"zone {zone.name[:60]!r}: {why}", zone)
 
 
 def _geometry(file: AirspaceFile, zone: Published, part: str, geometry: Any, shared: Any, where: str) -> None:
@@ -105,14 +108,13 @@ def _limits(layer: Any, where: str, policy: Policy) -> VolumeLimits:
     if layer is None:
         return VolumeLimits()
     if not isinstance(layer, dict):
-        raise MemberError(f"layer must be an object, given {shown(layer)}")
+        return VolumeLimits(faults=[Mistake(where, f"layer must be an object, given {shown(layer)}")])
     unit = layer.get("uom") or "m"
     remarks = unread(layer, LAYER_MEMBERS, all_of_them=True)
     given: list[Given | None] = []
     for side in ("lower", "upper"):
-        value = number_or_none(layer.get(side), f"layer.{side}")
         words = (str(unit)[:40], str(layer.get(f"{side}Reference") or "")[:40])
-        given.append(None if value is None else Given(value, words, (), side))
+        given.append(limit_of(layer.get(side), words, side))
     found = VolumeLimits.read(given[0], given[1], where, policy=policy)
     found.remarks += remarks
     return found

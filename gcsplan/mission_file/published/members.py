@@ -8,13 +8,17 @@ from itertools import chain
 from typing import Any
 
 from gcsplan.mission_file.published.policy import Published
-from gcsplan.mission_file.published.volumes import AirspaceFile, VolumeLimits
+from gcsplan.mission_file.published.volumes import AirspaceFile, Given, VolumeLimits
 from gcsplan.mission_file.zones.attributes import ATTRIBUTES_UNREAD, MOST_ATTRIBUTES_SHOWN, is_number, meaning_of, shown
 from gcsplan.mission_file.zones.draft import Remark, one_line
 from gcsplan.mission_file.zones.file import ZoneFile
 from gcsplan.world.geodesy.degree_shapes import Corner, beyond_outline
 
 _MEMBER_NUMBER = re.compile(r"[-+]?\d{1,9}(\.\d{1,9})?", re.ASCII)
+
+
+MOST_GEOMETRIES = 1000
+"""Most geometries of a collection."""
 
 
 class MemberError(ValueError):
@@ -95,14 +99,13 @@ def number_or_none(given: Any, name: str) -> float | int | None:
     raise MemberError(f"{name} must be a number, given {shown(given)}")
 
 
-def word(given: Any, name: str, *, known: Sequence[str] = ()) -> str:
-    """A text that must not be missing, one of the ``known`` if there are any. Raises MemberError."""
-    if not isinstance(given, str) or not given.strip():
-        raise MemberError(f"{name} must be text, given {shown(given)}")
-    plain = given.strip()
-    if known and plain.upper() not in known:
-        raise MemberError(f"{name} must be one of {', '.join(known)}, given {plain[:60]!r}")
-    return plain
+def limit_of(given: Any, words: tuple[str, ...], key: str) -> Given | None:
+    """A limit by its number; None without one. Another value stays as it is written, and mostly is no level then."""
+    try:
+        value = number_or_none(given, key)
+    except MemberError:
+        return Given(given if isinstance(given, str) else shown(given), words, (), key)
+    return None if value is None else Given(value, words, (), key)
 
 
 def read_features(
@@ -119,6 +122,20 @@ def read_features(
         except MemberError as why:
             file.fault(where, str(why))
     return file.finished()
+
+
+def parts_of(geometry: Any, name: str) -> list[tuple[str, dict[str, Any]]]:
+    """The polygons of a GeoJSON geometry, each with its name; a collection's are numbered. Raises MemberError."""
+    whole: Any = [geometry]
+    if isinstance(geometry, dict) and geometry.get("type") == "GeometryCollection":
+        whole = geometry.get("geometries")
+    if not isinstance(whole, list) or not 0 < len(whole) <= MOST_GEOMETRIES:
+        raise MemberError(f"a GeometryCollection has geometries, given {shown(whole)}")
+    for one in whole:
+        kind = one.get("type") if isinstance(one, dict) else one
+        if kind not in ("Polygon", "MultiPolygon"):
+            raise MemberError(f"the geometry must be a Polygon or a MultiPolygon, given {shown(kind)}")
+    return [(name if len(whole) == 1 else f"{name}/{i + 1}", one) for i, one in enumerate(whole)]
 
 
 def add_polygons(

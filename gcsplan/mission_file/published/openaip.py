@@ -7,7 +7,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from gcsplan.mission_file.published.members import MemberError, add_polygons, number_or_none, read_features, text_of
+from gcsplan.mission_file.published.members import MemberError, add_polygons, limit_of, read_features, text_of
 from gcsplan.mission_file.published.policy import Policy, Published
 from gcsplan.mission_file.published.times import ALWAYS, Period, TimeError, read_end, read_instant
 from gcsplan.mission_file.published.volumes import AirspaceFile, Given, VolumeLimits
@@ -64,36 +64,39 @@ def read_openaip(path: Path, whole: Any, policy: Policy) -> ZoneFile:
     if isinstance(whole, dict) and is_number(whole.get("totalPages")) and whole["totalPages"] > 1:
         page, pages = whole.get("page"), whole["totalPages"]
         words = f"the file is page {page} of {pages}, and the zones of the others are missing; save all pages and name"
-        file.fault(f"{path}: totalPages", f"{words} each (or ask for a larger `limit`) and write totalPages as 1")
+        file.refuse(f"{path}: totalPages", f"{words} each (or ask for a larger `limit`) and write totalPages as 1")
     return read_features(file, _airspaces(whole), key, _airspace)
 
 
 def _airspace(file: AirspaceFile, one: Any, where: str, fallback: str) -> None:
     members = _members(one)
     name = text_of(members.get("name")) or fallback
-    kinds = (_named(members, "type", dict(enumerate(TYPES)), name), _named(members, "icaoClass", CLASSES, name))
+    strange: list[str] = []
+    kinds = (_named(members, "type", dict(enumerate(TYPES)), strange), _named(members, "icaoClass", CLASSES, strange))
     restricts = kinds[0] not in FREE_TYPES or kinds[1] not in FREE_CLASSES | {"SUA"}
     if kinds[0] == "OTHER" and kinds[1] == "SUA":
         restricts = True  # nothing says that it is free
     periods, remarks = _times(members)
-    zone = Published(name, kinds, restricts, text_of(members.get("_id")), periods, remarks)
+    identifier, known = text_of(members.get("_id")), tuple(filter(None, kinds))
+    zone = Published(name, known, restricts, identifier, periods, remarks, tuple(strange))
     limits = _limits(members, where, file.policy)
-    geometry = one.get("geometry")
+    geometry = one.get("geometry") if isinstance(one, dict) else None
     kind = geometry.get("type") if isinstance(geometry, dict) else None
-    if not isinstance(geometry, dict) or kind not in ("Polygon", "MultiPolygon"):
-        raise MemberError(f"zone {name[:60]!r}: the geometry must be a Polygon, given {shown(kind)}")
     try:
+        if not isinstance(geometry, dict) or kind not in ("Polygon", "MultiPolygon"):
+            raise MemberError(f"the geometry must be a Polygon, given {shown(kind)}")
         add_polygons(file, zone, name, where, geometry, limits)
     except MemberError as why:
-        raise MemberError(f"zone {name[:60]!r}: {why}") from None
+        file.fault(where, f"zone {name[:60]!r}: {why}", zone)
 
 
-def _named(members: dict[str, Any], key: str, names: dict[int, str], zone: str) -> str:
-    """The name of a number of openAIP's. Raises MemberError if it has none."""
+def _named(members: dict[str, Any], key: str, names: dict[int, str], strange: list[str]) -> str:
+    """The name of a number of openAIP's; empty if it has none, which goes to ``strange``."""
     value = members.get(key)
-    if not is_number(value) or value not in names:
-        raise MemberError(f"zone {zone[:60]!r}: {key} must be one of openAIP's numbers, given {shown(value)}")
-    return names[value]
+    if is_number(value) and value in names:
+        return names[value]
+    strange.append(f"{key} must be one of openAIP's numbers, given {shown(value)}")
+    return ""
 
 
 def _limits(members: dict[str, Any], where: str, policy: Policy) -> VolumeLimits:
@@ -107,10 +110,10 @@ def _limits(members: dict[str, Any], where: str, policy: Policy) -> VolumeLimits
             given.append(None)
             continue
         if not isinstance(limit, dict):
-            raise MemberError(f"{side}Limit must be an object, given {shown(limit)}")
-        value = number_or_none(limit.get("value"), f"{side}Limit.value")
+            given.append(limit_of(shown(limit), (), f"{side}Limit"))
+            continue
         words = tuple(_code(limit, key, names) for key, names in (("unit", OPENAIP_UNITS), ("referenceDatum", DATUMS)))
-        given.append(None if value is None else Given(value, words, (), f"{side}Limit"))
+        given.append(limit_of(limit.get("value"), words, f"{side}Limit"))
     found = VolumeLimits.read(given[0], given[1], where, policy=policy)
     found.remarks += floating
     return found

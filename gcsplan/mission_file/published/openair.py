@@ -2,23 +2,19 @@
 
 One record stands on a line; a zone begins with AC and ends with the next. A comment begins with ``*``. Distances are
 nautical miles, bearings count from true north.
-
-Outlines with arcs become polygons that are nowhere smaller (`outline`). An arc that bulges out of its zone is drawn
-around the circle, one that bulges into it is drawn inside the circle. So the polygon contains the zone, and reaches
-some metres beyond it at most.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field
-from functools import lru_cache
 from pathlib import Path
 
-from gcsplan.errors import InputError, Mistake
+from gcsplan.errors import Mistake
 from gcsplan.figures import counted
+from gcsplan.mission_file.published.arcs import Arc, ArcError, corners_of, outline
 from gcsplan.mission_file.published.policy import UNREAD_TIMES, Policy, Published
 from gcsplan.mission_file.published.times import Period, TimeError, read_end, read_instant
 from gcsplan.mission_file.published.volumes import AirspaceFile, Given, VolumeLimits
@@ -26,8 +22,7 @@ from gcsplan.mission_file.zones.contents import decoded
 from gcsplan.mission_file.zones.draft import MAX_VERTICES, Remark, one_line
 from gcsplan.mission_file.zones.file import ZoneFile
 from gcsplan.notes.note import Datum, Note
-from gcsplan.world.geodesy.degree_shapes import LARGEST_RADIUS_M, MOST_LON_DEG, Corner
-from gcsplan.world.geodesy.frame import EARTH_RADIUS_M, Frame
+from gcsplan.world.geodesy.degree_shapes import MOST_LON_DEG, Corner
 
 NAUTICAL_MILE_M = 1852.0
 
@@ -49,6 +44,7 @@ IGNORED = frozenset({"AF", "AG", "AX", "AI", "AT", "SP", "SB"})
 
 DRAWING_RECORDS = frozenset({"DP", "DA", "DB", "DC", "DY"})
 
+EMPTY_LIMITS = Note("zone_limits_empty")
 UNSTATED_LIMITS = Note("zone_limits_in_feet_above_sea")
 
 _RECORD = re.compile(r"(V|[A-Z]{2})\s+(\S.*)", re.IGNORECASE)
@@ -62,6 +58,8 @@ _PART = r"(\d{1,3}(?:\.\d{1,20})?(?:\s*:\s*\d{1,2}(?:\.\d{1,20})?){0,2})"
 _LETTERS_FIRST = re.compile(rf"([NS])\s*{_PART}[\s,]*([EW])\s*{_PART}", re.ASCII | re.IGNORECASE)
 _COMPACT = re.compile(r"(?<![\d:.])(\d{2,3})([0-5]\d)([0-5]\d(?:\.\d{1,20})?)(?![\d:.])", re.ASCII)
 """Degrees, minutes and seconds in one number, such as 460500.00N 0143000.00E."""
+_SPACED = re.compile(r"(?<=\d)[ \t]+(?=\d)", re.ASCII)
+"""Between degrees, minutes and seconds, such as 46 05 00 N 014 30 00 E; between two places there are letters."""
 _LONGEST_LINE = 2000
 
 MOST_MISTAKES, MOST_FAULTS = 5, 1000
@@ -161,7 +159,14 @@ class _OpenAirReading:
         self.file.fault(f"{self.file.path}: line {number}", words)
 
     def _odd(self, number: int, record: str) -> None:
-        if record[:2].upper() in ("AN", "AY", "AF", "AG", "AX", "AI", "AT") and len(record) == 2:  # an empty record
+        code = record.upper()
+        if code in ("AN", "AY", *IGNORED):  # an empty record
+            return
+        if code == "AC":  # without a class the zone is no-fly, and never a part of the one before
+            self._record(number, code, "")
+            return
+        if code in ("AL", "AH") and self.block is not None:
+            self.block.remarks.append((EMPTY_LIMITS, Note("line_of_file", line=number, text=code)))
             return
         words = f"{record[:60]!r} is no record of OpenAir; write a comment with * before it"
         if self.block is not None:
@@ -172,7 +177,8 @@ class _OpenAirReading:
     def _record(self, number: int, code: str, value: str) -> None:
         if code == "AC":
             self._end()
-            self.block, self.passed = _Block(number, [_kind(value)]), False
+            self.block, self.passed = _Block(number, [_kind(value)] if value else []), False
+            self.block.mistakes += [] if value else [(number, "AC has no class")]
         elif code in ("TO", "TC"):  # terrain, which other records draw as they draw zones
             self._end()
             self.passed = True
@@ -281,18 +287,18 @@ class _OpenAirReading:
         limits.faults += [
             Mistake(f"{file.path}: line {number}", words) for number, words in block.mistakes[:MOST_MISTAKES]
         ]
-        if block.lost and not file.judge.reason(zone):  # the zone may reach farther than the part that is understood
-            for number, words in block.lost[:MOST_MISTAKES]:
-                file.fault(f"{file.path}: line {number}", f"zone {name[:60]!r}: {words}")
+        for number, words in block.lost[:MOST_MISTAKES]:
+            file.fault(f"{file.path}: line {number}", f"zone {name[:60]!r}: {words}", zone)
+        if block.lost:  # the zone may reach farther than the part that is understood
             return
         if (count := corners_of(block.pieces)) > MAX_VERTICES:
             words = f"its outline has {len(block.pieces)} points and arcs, drawn with {count} corners, more than"
-            file.fault(where, f"zone {name[:60]!r}: {words} {MAX_VERTICES}; simplify it")
+            file.fault(where, f"zone {name[:60]!r}: {words} {MAX_VERTICES}; simplify it", zone)
             return
         ring = outline(block.pieces)
         shapes = len(block.circles) + bool(ring)
-        if not shapes and not block.lost:
-            file.fault(where, "the zone has no outline (DP, DA, DB) and no circle (DC)")
+        if not shapes:
+            file.fault(where, "the zone has no outline (DP, DA, DB) and no circle (DC)", zone)
         for i, (centre, radius_m) in enumerate(block.circles):
             part = name if shapes == 1 else f"{name}/{i + 1}"
             file.add_circle(zone, part, where, centre, radius_m, limits)
@@ -344,7 +350,7 @@ def _places(text: str, count: int) -> tuple[list[Corner], str]:
     """The first places of a text, and what follows them, which is no place."""
     places: list[Corner] = []
     at = 0
-    text = _COMPACT.sub(r"\1:\2:\3", text)
+    text = _SPACED.sub(":", _COMPACT.sub(r"\1:\2:\3", text))
     if text[:1].upper() in ("N", "S"):
         text = _LETTERS_FIRST.sub(r"\2 \1 \4 \3", text)
     for match in _matches(text):
@@ -388,126 +394,3 @@ def _numbers(text: str, count: int) -> list[float]:
         needed = "a radius in nautical miles" if count == 1 else "a radius in nautical miles and two bearings"
         raise _RecordError(f"it needs {needed}")
     return numbers
-
-
-ARC_SAGITTA_M = 3.0
-WIDEST_STEP = math.radians(10.0)
-
-UNEVEN_M, UNEVEN_PART = 1000.0, 0.1
-"""Ends of one arc may lie this much nearer to its centre than each other, m or part of the radius: files round them."""
-
-
-class ArcError(ValueError):
-    """The arc cannot be drawn; the text says why."""
-
-
-@dataclass(frozen=True, slots=True)
-class Arc:
-    """An arc around ``centre``: bearings from true north, radians, the second reached from the first in its direction.
-
-    ``ends`` are the corners that it joins, if the file gives them; the radii are at its two ends, m.
-    """
-
-    centre: Corner
-    start: float
-    sweep: float
-    radii_m: tuple[float, float]
-    ends: tuple[Corner, Corner] | None = None
-
-    @classmethod
-    def by_bearings(cls, centre: Corner, radius_m: float, start_deg: float, end_deg: float, clockwise: bool) -> Arc:
-        """An arc of OpenAir's DA record. Raises ArcError."""
-        if not 0.0 < radius_m <= LARGEST_RADIUS_M:
-            raise ArcError(f"its radius must be above 0 and at most {LARGEST_RADIUS_M:g} m, given {radius_m:g} m")
-        if not (abs(start_deg) <= 720.0 and abs(end_deg) <= 720.0):
-            raise ArcError("its angles must be bearings in degrees")
-        _frame(centre)
-        sweep = _sweep(math.radians(start_deg), math.radians(end_deg), clockwise)
-        return cls(centre, math.radians(start_deg), sweep, (radius_m, radius_m))
-
-    @classmethod
-    def by_ends(cls, centre: Corner, first: Corner, last: Corner, clockwise: bool) -> Arc:
-        """An arc of OpenAir's DB record. Raises ArcError."""
-        frame = _frame(centre)
-        (e0, n0), (e1, n1) = frame.to_plane(*first), frame.to_plane(*last)
-        radii = math.hypot(e0, n0), math.hypot(e1, n1)
-        if not (all(math.isfinite(r) for r in radii) and 0.0 < min(radii) <= max(radii) <= LARGEST_RADIUS_M):
-            words = f"its ends must lie within {LARGEST_RADIUS_M:g} m of its centre"
-            raise ArcError(f"{words}, given {radii[0]:.0f} m and {radii[1]:.0f} m")
-        if abs(radii[0] - radii[1]) > max(UNEVEN_M, UNEVEN_PART * max(radii)):
-            raise ArcError(f"its ends lie {radii[0]:.0f} m and {radii[1]:.0f} m from its centre: that is no circle")
-        start, end = math.atan2(e0, n0), math.atan2(e1, n1)
-        return cls(centre, start, _sweep(start, end, clockwise), (radii[0], radii[1]), (first, last))
-
-    @property
-    def pieces(self) -> int:
-        """How many straight pieces the arc is drawn with; it has up to four corners more."""
-        step = min(WIDEST_STEP, 2.0 * math.acos(1.0 - min(ARC_SAGITTA_M / max(self.radii_m), 0.5)))
-        return max(1, math.ceil(abs(self.sweep) / step))
-
-    def corners(self, outward: bool | None) -> list[Corner]:
-        """The arc's corners: around the circle if it bulges ``outward``, inside it if not, on it if that is unknown."""
-        least, most = min(self.radii_m), max(self.radii_m)
-        count = self.pieces
-        part = self.sweep / count
-        if outward:  # tangents: their corners lie over the middle of each piece
-            most *= 1.0 + 0.2 * (most / EARTH_RADIUS_M) ** 2  # the plane stretches distances by (r/R)²/6 at most
-            radius = most / math.cos(0.5 * part)
-            places = [(self.start, most), *((self.start + (i + 0.5) * part, radius) for i in range(count))]
-            places.append((self.start + self.sweep, most))
-        else:
-            radius = least if outward is not None else most
-            places = [(self.start + i * part, radius) for i in range(count + 1)]
-        frame = _frame(self.centre)
-        at = frame.to_degrees([r * math.sin(b) for b, r in places], [r * math.cos(b) for b, r in places])
-        centre_lon = self.centre[1]  # beyond the antimeridian, if that is where the circle goes
-        corners = [(float(lat), centre_lon + ((float(lon) - centre_lon + 180.0) % 360.0 - 180.0)) for lat, lon in at]
-        return corners if self.ends is None else [self.ends[0], *corners, self.ends[1]]
-
-
-def corners_of(pieces: Sequence[Corner | Arc]) -> int:
-    """How many corners the outline of points and arcs has, before it is drawn; no more than it has."""
-    return sum(p.pieces if isinstance(p, Arc) else 1 for p in pieces)
-
-
-def outline(pieces: Sequence[Corner | Arc]) -> list[Corner]:
-    """The corners of an outline of points and arcs, in the order of the file."""
-    arcs = [p for p in pieces if isinstance(p, Arc)]
-    if not arcs:
-        return [p for p in pieces if not isinstance(p, Arc)]
-    clockwise = _is_clockwise(_drawn(pieces, None))
-    return _drawn(pieces, clockwise)
-
-
-def _drawn(pieces: Sequence[Corner | Arc], clockwise: bool | None) -> list[Corner]:
-    ring: list[Corner] = []
-    for piece in pieces:
-        if isinstance(piece, Arc):
-            ring += piece.corners(None if clockwise is None else (piece.sweep > 0.0) == clockwise)
-        else:
-            ring.append(piece)
-    return ring
-
-
-def _is_clockwise(ring: Sequence[Corner]) -> bool:
-    """Each edge goes the short way: a file may write 179 and -179 side by side."""
-    points = [(lon, lat) for lat, lon in ring[:1]]
-    for lat, lon in ring[1:]:
-        before = points[-1][0]
-        points.append((before + (lon - before + 180.0) % 360.0 - 180.0, lat))
-    area = sum(x0 * y1 - x1 * y0 for (x0, y0), (x1, y1) in zip(points, [*points[1:], points[0]], strict=True))
-    return area < 0.0
-
-
-def _sweep(start: float, end: float, clockwise: bool) -> float:
-    """The turn from ``start`` to ``end``, positive if clockwise; a whole turn if both are the same bearing."""
-    turn = (end - start) % (2.0 * math.pi) if clockwise else -((start - end) % (2.0 * math.pi))
-    return turn or (2.0 * math.pi if clockwise else -2.0 * math.pi)
-
-
-@lru_cache(maxsize=64)  # a file draws several arcs around one place
-def _frame(centre: Corner) -> Frame:
-    try:
-        return Frame(*centre)
-    except InputError:
-        raise ArcError(f"its centre {centre[0]:g}, {centre[1]:g} lies too near to a pole") from None

@@ -12,6 +12,7 @@ from gcsplan.errors import Mistake
 from gcsplan.mission_file.published.times import Hours, Period, apply_in
 from gcsplan.mission_file.values.schema import nearest
 from gcsplan.mission_file.zones.draft import Remark
+from gcsplan.mission_file.zones.file import Ignorable, OnBad
 from gcsplan.notes.note import Note
 
 UNREAD_TIMES = Note("zone_times_not_understood")
@@ -24,7 +25,9 @@ class Policy:
     """A mission's rules for one file: ``kinds`` that are no-fly, zones that it is ``authorised`` to enter, its hours.
 
     ``flight_level_error_m`` is how far flight levels may lie from their heights above sea level; None: they limit
-    nothing. ``where`` is the place of the entry in the mission file.
+    nothing. ``on_bad`` is the rule for elements that are not understood (None: by the file's format), ``ignore``
+    has the shapes beside zones that are left out. ``where`` is the place of the entry in the mission file, or the
+    option ``--zones``.
     """
 
     kinds: tuple[str, ...] | None = None
@@ -32,6 +35,17 @@ class Policy:
     hours: Hours | None = None
     flight_level_error_m: float | None = None
     where: str = ""
+    on_bad: OnBad | None = None
+    ignore: tuple[Ignorable, ...] = ()
+
+    @property
+    def by_options(self) -> bool:
+        """Whether a command's options stand for the keys of an entry."""
+        return self.where.startswith("--")
+
+    def place_of(self, key: str, option: str) -> str:
+        """The place of a key for messages: the key of the entry, or the option that stands for it."""
+        return option if self.by_options else f"{self.where}.{key}"
 
     @property
     def keys(self) -> list[str]:
@@ -48,7 +62,8 @@ class Policy:
 class Published:
     """One zone as its authority publishes it; ``kinds`` are its published words, in upper case.
 
-    ``restricts``: whether it is no-fly without a policy. Without ``periods`` it applies always.
+    ``restricts``: whether it is no-fly without a policy. Without ``periods`` it applies always. ``unread`` says what of
+    the kinds is not understood: it then counts as no-fly, whichever kinds are.
     """
 
     name: str
@@ -57,6 +72,7 @@ class Published:
     identifier: str = ""
     periods: tuple[Period, ...] = ()
     remarks: tuple[Remark, ...] = ()
+    unread: tuple[str, ...] = ()
 
 
 @dataclass
@@ -73,10 +89,10 @@ class PolicyJudge:
         self.kinds |= set(zone.kinds)
         own = {name for name in self.policy.authorised if name in (zone.identifier, zone.name)}
         self.entered |= own
-        kinds = self.policy.kinds
+        kinds = None if zone.unread else self.policy.kinds
         if kinds is not None and not {_plain(k) for k in kinds} & {_plain(k) for k in zone.kinds}:
             return Note("zones_of_other_kinds", kinds=kinds[:_KINDS_SHOWN])
-        if kinds is None and not zone.restricts:
+        if kinds is None and not zone.restricts and not zone.unread:
             return Note("zones_restrict_nothing")
         if own:
             return Note("zones_authorised")

@@ -8,6 +8,7 @@ from pathlib import PurePath
 
 from gcsplan.errors import Mistake
 from gcsplan.mission_file.zones.draft import ZoneDraft, one_line
+from gcsplan.mission_file.zones.file import SKIPPED
 from gcsplan.notes.note import Note
 from gcsplan.world.geodesy.frame import Frame
 from gcsplan.world.geometry.zones import Box, Zone
@@ -28,6 +29,21 @@ def faults_near(placed: Sequence[tuple[ZoneDraft, Zone]], box: Box) -> list[Mist
     return list(found)
 
 
+def not_understood_far(placed: Sequence[tuple[ZoneDraft, Zone]], far: Sequence[ZoneDraft], box: Box) -> list[Note]:
+    """A note with the name of every zone that is not understood and lies too far from the mission to matter.
+
+    ``far`` lies beyond the plane; of the others not even the surroundings reach into the mission's ``box``, beyond
+    which no ground is known, so that no flight is judged safe there.
+    """
+    near = {id(draft) for draft, zone in placed if _meets(zone, box)}
+    away = [*far, *(draft for draft, _ in placed if draft.faults and id(draft) not in near)]
+    found: dict[str, dict[str, None]] = {}
+    for draft in away:
+        if draft.faults or draft.unread:
+            found.setdefault(_file_of(draft), {})[one_line(draft.name)] = None
+    return [Note("zones_not_understood_far", file=file, zones=tuple(names)) for file, names in found.items()]
+
+
 def used(drafts: Sequence[ZoneDraft]) -> list[ZoneDraft]:
     """The zones that are no-fly."""
     return [d for d in drafts if not d.unused]
@@ -42,7 +58,7 @@ def unused_notes(drafts: Sequence[ZoneDraft], frame: Frame, box: Box) -> list[No
     """A note for each reason, with the name of every zone near the mission that is not used for it.
 
     Near is as far around the mission's surroundings as they extend, and at least `NAMED_WITHIN_M`; zones beyond are
-    counted.
+    counted. Zones that are not understood are named wherever they lie.
     """
     unused = [d for d in drafts if d.unused]
     if not unused:
@@ -52,7 +68,7 @@ def unused_notes(drafts: Sequence[ZoneDraft], frame: Frame, box: Box) -> list[No
     edges = frame.to_degrees(*zip(*_border(wider), strict=True))
     turned = (edges[:, 1] - frame.lon_deg + 180.0) % 360.0 - 180.0
     window = (turned.min(), edges[:, 0].min(), turned.max(), edges[:, 0].max())
-    near = [draft for draft in unused if _is_near(draft, frame, window)]
+    near = [draft for draft in unused if draft.unused == SKIPPED or _is_near(draft, frame, window)]
     notes = _reasons(near)
     if len(near) < len(unused):
         notes.append(Note("zones_unused_far_away", count=len(unused) - len(near)))
@@ -70,9 +86,13 @@ def _reasons(unused: Sequence[ZoneDraft]) -> list[Note]:
     about: dict[Note, list[str]] = {}
     for draft in unused:
         if draft.unused is not None:
-            why = draft.unused.of(file=PurePath(draft.where.split(": ", 1)[0]).name)
+            why = draft.unused.of(file=_file_of(draft))
             about.setdefault(why, []).append(one_line(draft.name))
     return [why.of(zones=tuple(names)) for why, names in about.items()]
+
+
+def _file_of(draft: ZoneDraft) -> str:
+    return PurePath(draft.where.split(": ", 1)[0]).name
 
 
 def _border(box: Box) -> list[tuple[float, float]]:

@@ -1,7 +1,8 @@
 """One volume of a published zone, from what its format says to the drafts that all zone files share.
 
-What is not understood never makes a zone smaller: it is kept as a fault of the draft, which refuses the mission if the
-zone lies near it (`left_out.faults_near`); farther away the zone counts from the ground up without end.
+What is not understood never makes a zone smaller. Limits, or a kind, are kept as ``unread`` of the draft, which then
+counts from the ground up without end; an outline that is not understood is a fault, which refuses a mission in its
+surroundings (`unused.faults_near`).
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from gcsplan.errors import InputError, Mistake
+from gcsplan.mission_file.published.arcs import Arc, ArcError
 from gcsplan.mission_file.published.policy import Policy, PolicyJudge, Published
 from gcsplan.mission_file.zones.attributes import OVER_PRESSURE, UNDER_PRESSURE, level_read
 from gcsplan.mission_file.zones.draft import (
@@ -162,24 +164,37 @@ class AirspaceFile:
 
     def finished(self) -> ZoneFile:
         """The zones, after what the policy names and no zone has is reported."""
-        self.found.problems += self.judge.slips()
+        self.found.refusals += self.judge.slips()
         return self.found
 
-    def fault(self, where: str, message: str) -> None:
-        """Refuse the file for a zone of which not even the place is known."""
-        self.found.problems.append(Mistake(where, message))
+    def fault(self, where: str, message: str, zone: Published | None = None) -> None:
+        """Report a zone of which not even the place is known; one that is not used anyway has a note by its name."""
+        unused = None if zone is None else self.judge.reason(zone)
+        if zone is None or unused is None:
+            self.found.problems.append(Mistake(where, message))
+        else:
+            note = unused.of(zones=(one_line(zone.name),))
+            self.found.own_notes += [note] if self.found.own_notes[-1:] != [note] else []
+
+    def refuse(self, where: str, message: str) -> None:
+        """Report a mistake of the file as a whole."""
+        self.found.refusals.append(Mistake(where, message))
 
     def add_circle(
         self, zone: Published, part: str, where: str, centre: Corner, radius_m: float, limits: VolumeLimits
     ) -> None:
-        """Add a cylinder called ``part``."""
+        """Add a cylinder called ``part``; a large one is a polygon around the circle."""
         if not check_degrees(centre, where, self.found.problems):
             return
         if 0.0 < radius_m <= LARGEST_RADIUS_M:
             self._add(zone, part, where, (centre,), radius_m, limits, [])
-        else:  # it may reach the mission from anywhere
-            words = f"the radius must be above 0 and at most {LARGEST_RADIUS_M:g} m, given {radius_m:g} m"
-            self.fault(where, f"zone {zone.name[:60]!r}: {words}")
+            return
+        try:
+            ring = Arc.circle(centre, radius_m).corners(outward=True)
+        except ArcError as why:  # it may reach the mission from anywhere
+            self.fault(where, f"zone {zone.name[:60]!r}: {why}", zone)
+            return
+        self.add_ring(zone, part, where, ring, limits)
 
     def add_ring(
         self, zone: Published, part: str, where: str, ring: Sequence[Corner], limits: VolumeLimits, holes: int = 0
@@ -187,7 +202,7 @@ class AirspaceFile:
         """Add a prism called ``part`` by its outline and the number of its holes."""
         self.found.holes += holes
         if len(ring) > MAX_VERTICES:
-            self.fault(where, f"has {len(ring)} points, more than {MAX_VERTICES}; simplify it")
+            self.fault(where, f"has {len(ring)} points, more than {MAX_VERTICES}; simplify it", zone)
             return
         for lat, lon in ring:
             right = -90.0 <= lat <= 90.0 and -180.0 <= lon <= 180.0  # most are: no call for each of 100,000
@@ -202,18 +217,16 @@ class AirspaceFile:
         if not why:
             self._add(zone, part, where, tuple(outline), None, limits, [], doubt)
             return
+        if len(set(outline)) < 3:  # where its other corners are is unknown
+            self.fault(where, f"zone {zone.name[:60]!r}: {why}; {OUTLINE_CURE}", zone)
+            return
         at = np.asarray(outline, float)
         tangled = overlapping_pairs(at) > MOST_EDGE_PAIRS or crossings(at) > MOST_CROSSINGS
         if tangled:
             why = f"its outline of {len(outline)} corners is too tangled to tell what it encloses"
-        parts = enclosed(outline) if len(set(outline)) > 2 and not tangled else []
+        parts = [] if tangled else enclosed(outline)
         if not parts:
-            if ring:
-                self._add(
-                    zone, part, where, self._around(ring), None, limits, [Mistake(where, f"{why}; {OUTLINE_CURE}")]
-                )
-            else:
-                self.fault(where, "the polygon has no points")
+            self._add(zone, part, where, self._around(ring), None, limits, [Mistake(where, f"{why}; {OUTLINE_CURE}")])
             return
         if self.great_circles:  # whose crossings lie elsewhere
             try:
@@ -251,17 +264,15 @@ class AirspaceFile:
         self, zone: Published, part: str, where: str, points: tuple[Corner, ...], radius_m: float | None,
         limits: VolumeLimits, faults: list[Mistake], doubt: tuple[Corner, ...] = (),
     ) -> None:  # fmt: skip
-        faults = [Mistake(p.where, f"zone {zone.name[:60]!r}: {p.message}") for p in (*limits.faults, *faults)]
-        floor, ceiling = (None, None) if faults else limits.bounds.levels(where, [])
+        unread = (*limits.faults, *(Mistake(where, why) for why in zone.unread))
+        floor, ceiling = (None, None) if faults or unread else limits.bounds.levels(where, [])
+        faults = [Mistake(p.where, f"zone {zone.name[:60]!r}: {p.message}") for p in faults]
         remarks = [*zone.remarks, *limits.remarks]
-        if faults:
-            remarks.append((Note("zone_limits_not_understood"), None))
         if doubt:
             remarks.append((ACROSS_ANTIMERIDIAN, None))
         draft = ZoneDraft(
             part[:200], where, points, False, radius_m, floor, ceiling,
-            unused=self.judge.reason(zone), faults=tuple(faults),
-            doubt=doubt,
+            unused=self.judge.reason(zone), faults=tuple(faults), unread=unread, doubt=doubt,
         )  # fmt: skip
         self.found.add(draft, remarks)
 

@@ -162,9 +162,13 @@ class ZoneKeys(Keys):
     buffer_m: float | None = None
     """Half the width of a corridor around a line, at most 20 000; with `file` that of its lines that have none."""
     file: Text | None = None
-    """A file of zones: .geojson, .kml, .kmz, .gpkg, .shp, .fgb, .zip, .csv, OpenAir, ED-269, ED-318 or openAIP."""
+    """Zones: .geojson, .kml, .kmz, .gpkg, .shp, .fgb, .zip, .csv, a fence, OpenAir, ED-269, ED-318 or openAIP."""
     layer: Text | None = None
     """With `file`: the only layer of a .gpkg to be read; if absent, every one."""
+    on_bad: Literal["refuse", "strict", "skip"] | None = None
+    """With `file`: what zones do that are not understood; if absent, own files refuse, authorities' are strict."""
+    ignore: Annotated[list[Literal["points", "lines", "empty"]], Field(max_length=10)] = []
+    """With a file of your own: shapes beside zones, without a size of their own, that are left out by name."""
     kinds: Annotated[list[Text], Field(min_length=1, max_length=100)] | None = None
     """With an authority's file: the kinds of zones that are no-fly; if absent, all that restrict."""
     authorised: Annotated[list[Text], Field(max_length=1000)] = []

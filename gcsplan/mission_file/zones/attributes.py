@@ -130,10 +130,17 @@ class ZoneStatements:
     of_levels: bool
     """Whether an attribute speaks of a floor or ceiling, if only to say that there is none."""
     buffer_m: float | None = None
+    unread: tuple[Mistake, ...] = ()
+    """Mistakes in its floor and ceiling, which are then missing."""
 
 
-def read_attributes(given: Sequence[Attribute], name: str, problems: list[Mistake]) -> ZoneStatements | None:
-    """The statements of the attributes; ``name`` is for a zone without one. None, and ``problems``, if unreadable."""
+def read_attributes(
+    given: Sequence[Attribute], where: str, name: str, problems: list[Mistake]
+) -> ZoneStatements | None:
+    """The statements of the attributes of the zone at ``where``; ``name`` is for a zone without one.
+
+    None, and ``problems``, if its size cannot be read; mistakes in its floor and ceiling are in ``unread``.
+    """
     known: list[Attribute] = []
     ignored: list[Attribute] = []
     times: list[Attribute] = []
@@ -147,17 +154,25 @@ def read_attributes(given: Sequence[Attribute], name: str, problems: list[Mistak
             times.append(a)
         elif meaning.seems_a_limit or _reads_as_level(a.value):
             ignored.append(a)
-    reading = _ZoneReading(_name(known) or name, problems)
     before = len(problems)
-    radius_m, buffer_m = (reading.size_m([a for a in known if a.meaning.lower == size]) for size in SIZE_KEYS)
+    own_name = _name(known) or name
+    sizes = _ZoneReading(own_name, problems)
+    radius_m, buffer_m = (sizes.size_m([a for a in known if a.meaning.lower == size]) for size in SIZE_KEYS)
+    unread: list[Mistake] = []
+    reading = _ZoneReading("", unread)
     bounds = reading.bounds(known)
+    if not unread:
+        bounds.levels(where, unread)
     for note, some in ((ATTRIBUTES_UNREAD, ignored), (TIMES_UNREAD, times)):
         if some:
             more = ("…",) if len(some) > MOST_ATTRIBUTES_SHOWN else ()
             reading.remarks.append((note, (*map(str, some[:MOST_ATTRIBUTES_SHOWN]), *more)))
     if len(problems) > before:
         return None
-    return ZoneStatements(reading.name, radius_m, bounds, tuple(reading.remarks), reading.of_levels, buffer_m)
+    return ZoneStatements(
+        own_name, radius_m, Bounds() if unread else bounds, tuple(reading.remarks), reading.of_levels, buffer_m,
+        tuple(unread),
+    )  # fmt: skip
 
 
 def level_read(given: object, bound: str, level: Level) -> Note:
@@ -201,7 +216,7 @@ def _reads_as_level(value: Any) -> bool:
 
 @dataclass
 class _ZoneReading:
-    """One zone while its attributes are read."""
+    """One zone while its attributes are read; without a ``name`` its mistakes do not begin with it."""
 
     name: str
     problems: list[Mistake]
@@ -286,7 +301,8 @@ class _ZoneReading:
             return None
 
     def _wrong(self, attribute: Attribute, words: str) -> None:
-        self.problems.append(Mistake(attribute.where, f"zone {self.name[:60]!r}: {attribute} {words}"))
+        named = f"zone {self.name[:60]!r}: " if self.name else ""
+        self.problems.append(Mistake(attribute.where, f"{named}{attribute} {words}"))
 
 
 def _parts(value: dict[Any, Any]) -> tuple[Any, list[str]]:

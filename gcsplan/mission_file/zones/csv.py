@@ -53,7 +53,7 @@ def read_csv(path: Path, data: bytes) -> ZoneFile:
         words = f"the file must be UTF-8 text, byte {why.start} is not; save it as `CSV UTF-8`"
         raise InputError(words, where=str(path)) from None
     lines = text.splitlines()
-    filled = [line.strip() for line in lines[:20] if line.strip()]
+    filled = [line.strip(" ") for line in lines[:20] if line.strip()]  # a tab may be what sep= says
     separator = _SEPARATOR.fullmatch(filled[0]) if filled else None
     header = filled[0] if filled else ""
     delimiter = separator[1] if separator is not None else max(DELIMITERS, key=header.count)
@@ -74,7 +74,7 @@ def read_csv(path: Path, data: bytes) -> ZoneFile:
                 _row(found, columns, row, f"{path}: line {rows.line_num}", f"{path.stem}[{rows.line_num}]")
     except csv.Error as why:
         raise InputError(f"this is not a table: {why}", where=f"{path}: line {rows.line_num}") from None
-    if columns is None or not (found.zones or found.unsized or found.problems):
+    if columns is None or not (found.zones or found.unsized or found.unshaped or found.problems):
         raise InputError(f"holds no row; the first line names the columns ({EXAMPLE})", where=str(path))
     return found
 
@@ -109,9 +109,15 @@ def _row(found: ZoneFile, columns: _Columns, row: list[str], where: str, fallbac
         found.problems.append(Mistake(where, words + cure))
         return
     cells = [cell.strip() for cell in row] + [""] * (len(columns.names) - len(row))
+    empty = [columns.names[i] for i in columns.place if not cells[i]]
+    if empty:
+        words = f"{' and '.join(empty)} is empty; write the place, or remove the row, or leave it out by name"
+        mistake = Mistake(where, f"{words} (ignore: [empty], --ignore empty)")
+        found.unshaped.append(("empty", f"{fallback} {cells[0][:60]}".strip(), mistake))
+        return
     centre = _place(found, columns, cells, where)
     given = [_attribute(columns, i, cell, where) for i, cell in enumerate(cells) if i not in columns.place and cell]
-    stated = read_attributes(given, fallback, found.problems)
+    stated = read_attributes(given, where, fallback, found.problems)
     if centre is not None and stated is not None:
         found.add_circle(stated, stated.name, where, centre)
 
@@ -121,10 +127,7 @@ def _place(found: ZoneFile, columns: _Columns, cells: list[str], where: str) -> 
     written = [cells[i] for i in columns.place]
     if len(written) == 2 and columns.comma:
         written = [_pointed(cell) for cell in written]
-    empty = [columns.names[i] for i in columns.place if not cells[i]]
     try:
-        if empty:
-            raise ValueError(f"{' and '.join(empty)} is empty; write the place, or remove the row")
         place = read_place(", ".join(written))
     except ValueError as why:
         found.problems.append(Mistake(where, str(why)))

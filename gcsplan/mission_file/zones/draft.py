@@ -71,7 +71,8 @@ class ZoneDraft:
     ``points`` is the centre alone (with ``radius_m``), a line (with ``buffer_m``, the half-width of its corridor), or a
     polygon's vertices, not closed: (latitude, longitude) in degrees, or (east_m, north_m) if ``local``. ``where`` is
     its place in the user's file. ``unused`` says why a zone of an authority's file is not used; ``faults`` are what is
-    not understood of it, which refuses a mission near it. ``great_circles``: its format does not say that edges are
+    not understood of its outline, which refuses a mission near it, ``unread`` what is not of its floor and ceiling:
+    it then counts from the ground up without end. ``great_circles``: its format does not say that edges are
     straight in degrees, so that what they enclose along great circles belongs to the zone, too. ``doubt`` is where a
     polygon that is read as across the antimeridian lies if it goes around the other side: a mission there is refused.
     """
@@ -87,6 +88,7 @@ class ZoneDraft:
     buffer_m: float | None = None
     unused: Note | None = None
     faults: tuple[Mistake, ...] = ()
+    unread: tuple[Mistake, ...] = ()
     great_circles: bool = False
     doubt: tuple[tuple[float, float], ...] = ()
 

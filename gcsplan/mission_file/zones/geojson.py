@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,9 +10,12 @@ from gcsplan.errors import InputError, Mistake
 from gcsplan.export.geojson import GENERATOR
 from gcsplan.mission_file.zones.attributes import Attribute, ZoneStatements, is_number, read_attributes, shown
 from gcsplan.mission_file.zones.draft import SIZE_KEYS
-from gcsplan.mission_file.zones.file import Drawn, ZoneFile, drawn_unread
+from gcsplan.mission_file.zones.file import EMPTY_CURE, Drawn, ZoneFile, drawn_unread
 from gcsplan.notes.note import Note
 from gcsplan.world.geodesy.degree_shapes import beyond_outline
+
+MOST_SHAPES = 1000
+"""Most geometries of one feature."""
 
 MOST_MISTAKES = 1000
 """Most mistakes of a file that are looked for."""
@@ -69,15 +73,41 @@ def _feature(found: ZoneFile, feature: Any, where: str, fallback: str) -> None:
     if feature.get("type") == "Feature":
         geometry = feature.get("geometry")
         properties = feature.get("properties") or {}
-    if not isinstance(properties, dict) or not isinstance(geometry, dict):
+    if not isinstance(properties, dict) or not isinstance(geometry, dict | None):
         what = "properties must be an object" if not isinstance(properties, dict) else "the feature has no geometry"
         found.problems.append(Mistake(where, what))
         return
-    stated = read_attributes(_attributes(properties, geometry, where), fallback, found.problems)
+    stated = read_attributes(_attributes(properties, geometry or {}, where), where, fallback, found.problems)
     if stated is None:
         return
-    kind, coordinates = geometry.get("type"), geometry.get("coordinates")
-    at = f"{where}.geometry.coordinates" if geometry is not feature else f"{where}.coordinates"
+    shapes = _shapes(geometry, f"{where}.geometry" if geometry is not feature else where)
+    if not shapes:
+        found.unshaped.append(("empty", stated.name, Mistake(where, f"the feature has no geometry; {EMPTY_CURE}")))
+    if len(shapes) > MOST_SHAPES:
+        found.problems.append(Mistake(where, f"has more than {MOST_SHAPES} geometries; split it"))
+        return
+    for i, (shape, at) in enumerate(shapes):
+        part = stated if len(shapes) == 1 else replace(stated, name=f"{stated.name}/{i + 1}")
+        _geometry(found, shape, part, where, f"{at}.coordinates")
+
+
+def _shapes(geometry: dict[str, Any] | None, at: str) -> list[tuple[Any, str]]:
+    """The geometries in a geometry, a collection's too, each with its place; empty ones, and null, have none."""
+    stack: list[tuple[Any, str]] = [(geometry, at)]
+    shapes: list[tuple[Any, str]] = []
+    while stack and len(shapes) <= MOST_SHAPES:
+        one, place = stack.pop()
+        inner = one.get("geometries") if isinstance(one, dict) and one.get("type") == "GeometryCollection" else None
+        if isinstance(inner, list):
+            stack += [(g, f"{place}.geometries[{k}]") for k, g in reversed(list(enumerate(inner)))]
+        elif one is not None and not (isinstance(one, dict) and "type" in one and one.get("coordinates") == []):
+            shapes.append((one, place))
+    return shapes
+
+
+def _geometry(found: ZoneFile, geometry: Any, stated: ZoneStatements, where: str, at: str) -> None:
+    """Add what one geometry draws, which is no collection."""
+    kind, coordinates = (geometry.get("type"), geometry.get("coordinates")) if isinstance(geometry, dict) else ("", "")
     if kind == "Point":
         centre = _position(found, coordinates, at)
         if centre is not None:

@@ -20,7 +20,7 @@ from gcsplan.errors import InputError, Mistake
 from gcsplan.figures import counted
 from gcsplan.mission_file.zones.attributes import Attribute, ZoneStatements, as_figure, read_attributes
 from gcsplan.mission_file.zones.draft import SIZE_KEYS
-from gcsplan.mission_file.zones.file import NOT_DRAWN, Drawn, ZoneFile
+from gcsplan.mission_file.zones.file import NOT_DRAWN, Drawn, Ignorable, ZoneFile
 from gcsplan.mission_file.zones.levels import LARGEST_M
 from gcsplan.notes.note import Note
 from gcsplan.world.geodesy.degree_shapes import beyond_outline
@@ -40,6 +40,11 @@ _PICTURES = ("PhotoOverlay", "ScreenOverlay", "Tour")
 """Elements that decorate the map and limit nothing."""
 
 _READ_SHAPES = ("Polygon", "Point", "LineString")
+_BESIDE: dict[str, Ignorable] = {
+    "LinearRing": "lines", "Track": "lines", "MultiTrack": "lines", "Model": "points", "none": "empty",
+}  # fmt: skip
+"""How a mission ignores the geometries of a Placemark that are no zone."""
+
 _KML_SHAPES = (*_READ_SHAPES, "LinearRing", "Model", "Track", "MultiTrack")
 
 
@@ -68,7 +73,9 @@ def read_kml(path: Path, data: bytes) -> ZoneFile:
         if kind == "Placemark":
             placemarks += 1
             _placemark(found, element, placemarks)
-        elif kind in ("NetworkLink", "NetworkLinkControl", "GroundOverlay"):
+        elif kind == "NetworkLink":
+            found.problems.append(_network_link(element, path))
+        elif kind in ("NetworkLinkControl", "GroundOverlay"):
             found.problems.append(Mistake(f"{path}: {kind}", f"a {kind} cannot be read as a zone; remove it"))
     if pictures:
         kinds = tuple(counted(count, kind) for kind, count in pictures.items())
@@ -98,24 +105,36 @@ def _kind(element: Any) -> str:
     return element.tag.rpartition("}")[2] if isinstance(element.tag, str) else ""
 
 
+def _network_link(element: Any, path: Path) -> Mistake:
+    """The mistake of a link, whose file may hold zones, and lies elsewhere."""
+    texts = {_kind(e): (e.text or "").strip() for e in element.iter() if _kind(e) in ("name", "href")}
+    named = f" ({texts['name'][:60]})" if texts.get("name") else ""
+    words = f"the zones of the link to {texts.get('href', '')[:200] or 'nothing'} are not in this file, and gcsplan "
+    words += (
+        "follows no link: open it in Google Earth, save what it shows as .kmz, and name that file; or remove the link"
+    )
+    return Mistake(f"{path}: NetworkLink{named}", words)
+
+
 def _placemark(found: ZoneFile, placemark: Any, number: int) -> None:
     name = next((t for c in placemark if _kind(c) == "name" and (t := (c.text or "").strip())), "")
     where = f"{found.path}: Placemark {number}" + (f" ({name[:60]})" if name else "")
     given = [Attribute("name", name, where), *_extended_data(placemark, where), *_times(placemark, where)]
-    stated = read_attributes(given, f"{found.path.stem}[{number}]", found.problems)
+    stated = read_attributes(given, where, f"{found.path.stem}[{number}]", found.problems)
     if stated is None:
         return
-    shapes = [e for e in _walk(placemark, found.path, leaves=_READ_SHAPES) if _kind(e) in _KML_SHAPES]
-    others = [_kind(e) for e in shapes if _kind(e) not in _READ_SHAPES]
-    if others or not shapes:
-        kind = others[0] if others else "none"
-        found.problems.append(
-            Mistake(
-                where,
-                f"its geometry must be Polygons, Points with a radius_m or LineStrings with a buffer_m, given {kind}",
-            )
-        )
+    below = list(_walk(placemark, found.path, leaves=_KML_SHAPES))
+    if any(_kind(e) == "Placemark" for e in below[1:]):
+        found.problems.append(Mistake(where, "holds another Placemark; end each before the next begins"))
         return
+    shapes = [e for e in below if _kind(e) in _KML_SHAPES]
+    others = dict.fromkeys(_kind(e) for e in shapes if _kind(e) not in _READ_SHAPES)
+    for kind in others or ([] if shapes else ["none"]):
+        words = f"its geometry must be Polygons, Points with a radius_m or LineStrings with a buffer_m, given {kind}"
+        ignored = _BESIDE[kind]
+        cure = f"remove it, or leave it out by name (ignore: [{ignored}], --ignore {ignored})"
+        found.unshaped.append((ignored, stated.name, Mistake(where, f"{words}; {cure}")))
+    shapes = [e for e in shapes if _kind(e) in _READ_SHAPES]
     for i, shape in enumerate(shapes):
         part = stated.name if len(shapes) == 1 else f"{stated.name}/{i + 1}"
         if _kind(shape) == "Point":

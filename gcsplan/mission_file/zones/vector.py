@@ -16,7 +16,7 @@ from gcsplan.errors import InputError, Mistake
 from gcsplan.mission_file.zones.attributes import Attribute, ZoneStatements, as_figure, read_attributes
 from gcsplan.mission_file.zones.contents import unpack
 from gcsplan.mission_file.zones.draft import MAX_VERTICES, SIZE_KEYS
-from gcsplan.mission_file.zones.file import MAX_ZONES, Drawn, ZoneFile, drawn_unread
+from gcsplan.mission_file.zones.file import EMPTY_CURE, MAX_ZONES, Drawn, ZoneFile, drawn_unread
 from gcsplan.notes.note import Note
 from gcsplan.world.geodesy.degree_shapes import beyond_outline
 from gcsplan.world.geodesy.reprojection import ToDegrees
@@ -167,7 +167,7 @@ def _layer(found: ZoneFile, pyogrio: Any, source: Path, layer: str) -> None:
     for i, (fid, geometry) in enumerate(zip(fids, geometries, strict=True)):
         at = f"{where}: feature {fid}"
         given = _attributes({name: column[i] for name, column in zip(names, columns, strict=True)}, at)
-        stated = read_attributes(given, f"{found.path.stem}[{fid}]", found.problems)
+        stated = read_attributes(given, at, f"{found.path.stem}[{fid}]", found.problems)
         if stated is not None:
             _feature(found, geometry, stated, at, to_degrees)
 
@@ -202,7 +202,7 @@ def _feature(
     """Add every part of a feature's geometry."""
     parts = [] if geometry is None else _parts(geometry)
     if not parts:
-        found.problems.append(Mistake(where, "the feature has no geometry; remove it, or draw it"))
+        found.unshaped.append(("empty", stated.name, Mistake(where, f"the feature has no geometry; {EMPTY_CURE}")))
     for i, shape in enumerate(parts):
         part = stated.name if len(parts) == 1 else f"{stated.name}/{i + 1}"
         if shape.geom_type not in ("Polygon", "Point", "LineString"):

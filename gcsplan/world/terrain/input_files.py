@@ -29,9 +29,9 @@ from typing import Any
 from gcsplan.errors import nearest_name
 
 __all__ = [
-    "JSON_ZONES", "LOG_FILES", "MISSION_FILES", "OPENAIR_ZONES", "TERRAIN_FILES", "VECTOR_ZONES", "VEHICLE_FILES",
-    "ZONES_BY_NAME", "ZONE_FILES", "FileReading", "absent", "beside", "files_of", "path_of", "reading", "sha256_of",
-    "sha256_of_all", "states_of", "tell_file", "tell_folder", "tell_raster", "tell_setting",
+    "FENCE_ZONES", "JSON_ZONES", "LOG_FILES", "MISSION_FILES", "OPENAIR_ZONES", "TERRAIN_FILES", "VECTOR_ZONES",
+    "VEHICLE_FILES", "ZONES_BY_NAME", "ZONE_FILES", "FileReading", "absent", "beside", "files_of", "path_of", "reading",
+    "sha256_of", "sha256_of_all", "states_of", "tell_file", "tell_folder", "tell_raster", "tell_setting",
 ]  # fmt: skip
 
 # Endings, in lower case, by which a reader is chosen, and a message names the key to which a misplaced file belongs.
@@ -39,7 +39,10 @@ JSON_ZONES = (".geojson", ".json")
 VECTOR_ZONES = (".gpkg", ".shp", ".fgb", ".zip")
 ZONE_FILES = (*JSON_ZONES, ".kml", ".kmz", ".csv", *VECTOR_ZONES)
 OPENAIR_ZONES = (".openair", ".air", ".txt")
-ZONES_BY_NAME = tuple(ending for ending in ZONE_FILES if ending != ".json")
+FENCE_ZONES = (".fen", ".poly", ".waypoints")
+"""Fences of Mission Planner and MAVProxy."""
+
+ZONES_BY_NAME = (*(ending for ending in ZONE_FILES if ending != ".json"), ".fen", ".poly")
 """Zones by their names alone: JSON holds much else."""
 
 TERRAIN_FILES = (".tif", ".tiff", ".hgt", ".asc", ".dat")

@@ -102,7 +102,7 @@ def test_zones_of_an_authority_that_restrict_nothing_are_no_zones(
     for arguments in (("check", "a.txt"), ("plan", "m.yaml")):
         told = document(capsys, *arguments)
         assert "TH-3-1" not in [zone["name"] for zone in told["zones"]]
-        assert "a.txt: not used, because they restrict nothing: TH-3-1" in told["notes"]
+        assert "a.txt: not used, because their kind restricts nothing: TH-3-1" in told["notes"]
 
 
 def test_mistakes_in_zones_are_told_and_others_are_not(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from gcsplan.errors import InputError
+from gcsplan.errors import InputError, Mistake
 from gcsplan.mission_file.published.policy import Policy
 from gcsplan.mission_file.zone_reader import read_zones
 from gcsplan.mission_file.zones.draft import ZoneDraft
@@ -25,12 +25,13 @@ def read(folder: Path, content: Any, name: str = "zones.json", **policy: Any) ->
 
 
 def said(folder: Path, content: Any, name: str = "zones.json", **policy: Any) -> str:
-    """Everything that is wrong with a file: what refuses it, and what refuses a mission near it."""
+    """Everything that is wrong with a file: what refuses it, what refuses a mission near it, and what is not read."""
     try:
         found = read(folder, content, name, **policy)
     except InputError as error:
         return str(error)
-    return "\n".join(str(p) for p in [*found.problems, *(f for z in found.zones for f in z.faults)])
+    unread = [Mistake(p.where, f"zone {z.name!r}: {p.message}") for z in found.zones for p in z.unread]
+    return "\n".join(str(p) for p in [*found.problems, *(f for z in found.zones for f in z.faults), *unread])
 
 
 def outcome(folder: Path, content: Any, name: str = "zones.json") -> str:

@@ -54,7 +54,7 @@ def test_an_authorisation_is_named_with_who_gives_it(tmp_path: Path) -> None:
         (ed269(volume(uomDimensions=...)), "upperLimit 120 AGL cannot be read as a level: it has no unit"),
         (ed269(volume(uomDimensions="YD")), "'YD' is not known"),
         (ed269(volume(upperVerticalReference="QNH")), "'QNH' is not known"),
-        (ed269(volume(upperLimit="high")), "upperLimit must be a number, given 'high'"),
+        (ed269(volume(upperLimit="high")), "upperLimit high M AGL cannot be read as a level: 'HIGH' is not known"),
         (ed269(volume(upperLimit=0)), "the zone would lie wholly under ground"),
         (ed269(volume(lowerLimit=200)), "the floor must be below the ceiling"),
         (ed269(volume(horizontalProjection={"type": "Circle", "center": [8, 47]})), "a Circle has a radius in metres"),
@@ -218,7 +218,10 @@ def test_openaip_is_read_in_its_three_wrappings(tmp_path: Path, wrap: Any) -> No
     ("changes", "words"),
     [
         ({"upperLimit": {"value": 100, "unit": 9, "referenceDatum": 1}}, "cannot be read as a level"),
-        ({"upperLimit": {"value": "x", "unit": 1, "referenceDatum": 1}}, "upperLimit.value must be a number"),
+        (
+            {"upperLimit": {"value": "x", "unit": 1, "referenceDatum": 1}},
+            "upperLimit x FT MSL cannot be read as a level: 'X' is not known",
+        ),
         ({"type": 99}, "type must be one of openAIP's numbers, given 99"),
         ({"icaoClass": 7}, "icaoClass must be one of openAIP's numbers, given 7"),
         ({"geometry": {"type": "Point", "coordinates": [8, 47]}}, "the geometry must be a Polygon, given 'Point'"),

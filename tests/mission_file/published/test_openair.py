@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from pyproj import Geod
 
-from gcsplan.mission_file.published.openair import Arc, outline
+from gcsplan.mission_file.published.arcs import Arc, outline
 from gcsplan.mission_file.published.times import Hours
 from gcsplan.mission_file.zones.draft import ZoneDraft
 from tests.mission_file.published.made import limits, outcome, read, remarks, said
@@ -238,8 +238,8 @@ def test_terrain_labels_and_radio_are_ignored_by_name(tmp_path: Path) -> None:
         ("V X=47:00:00 N 008:00:00 E\nDA 5,0", "a radius in nautical miles and two bearings"),
         ("V X=47:00:00 N 008:00:00 E\nDA nan,0,9", "a radius in nautical miles and two bearings"),
         ("V X=47:00:00 N 008:00:00 E\nDA -1,0,9", "its radius must be above 0"),
-        ("V X=47:00:00 N 008:00:00 E\nDC 0", "the radius must be above 0"),
-        ("V X=47:00:00 N 008:00:00 E\nDC 100", "given 185200 m"),
+        ("V X=47:00:00 N 008:00:00 E\nDC 0", "its radius must be above 0"),
+        ("V X=47:00:00 N 008:00:00 E\nDC 600", "given 1.1112e+06 m"),
         ("V X=89:00:00 N 008:00:00 E\nDA 5,0,90", "too near to a pole"),
         ("XY 5", "the record XY is not known"),
         ("this is no record", "'this is no record' is no record of OpenAir"),
@@ -265,14 +265,14 @@ def test_a_file_without_zones_is_refused_in_few_words(tmp_path: Path, text: str,
     assert len(found) < 2000
 
 
-@pytest.mark.parametrize("line", ["DP 50:00:00 N 008:99:00 E", "DP 47:03:00 N", "V X=here", "lost words", "DC 400"])
+@pytest.mark.parametrize("line", ["DP 50:00:00 N 008:99:00 E", "DP 47:03:00 N", "V X=here", "lost words", "DC 4000"])
 def test_an_outline_that_is_not_understood_is_refused_wherever_its_rest_lies(tmp_path: Path, line: str) -> None:
     text = f"AC R\nAN far\nV X=47:00:00 N 008:00:00 E\n{SQUARE}{line}\nAC R\nAN whole\n{SQUARE}"
     found = read(tmp_path, text, "a.txt")
     assert len(found.problems) == 1
     assert "far" in str(found.problems[0])
     assert "whole" in [z.name for z in found.zones]
-    assert not read(tmp_path, text.replace("AC R", "AC G", 1), "a.txt").problems or line == "DC 400"
+    assert not read(tmp_path, text.replace("AC R", "AC G", 1), "a.txt").problems or line == "DC 4000"
 
 
 def test_older_letters_are_read(tmp_path: Path) -> None:

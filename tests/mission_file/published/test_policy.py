@@ -6,6 +6,7 @@ import json
 import math
 import random
 import time
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
@@ -129,18 +130,66 @@ def test_a_flight_that_outlasts_the_hours_is_refused(tmp_path: Path) -> None:
         plan(mission(tmp_path, WEEKLY, at="2026-11-24"), gate_utc=datetime(2026, 11, 23, 22, 0, tzinfo=UTC))
 
 
-def test_what_is_not_understood_refuses_a_mission_near_it_alone(tmp_path: Path) -> None:
-    odd = {"upperVerticalReference": "QNE"}
-    with pytest.raises(InputError, match="zone 'near': upperLimit 120 M QNE cannot be read as a level"):
-        mission(tmp_path, SHUT, ed269(box(8.02, 47.0, **odd), name="near"))
-    found = mission(
-        tmp_path, SHUT, ed269(box(9.5, 47.0, lowerLimit=50, **odd), name="distant"), ed269(box(40.0, 47.0, **odd))
-    )
-    [distant] = [z for z in found.zones if z.name == "distant"]
-    assert (distant.floor, distant.ceiling) == (None, None)
-    assert "they count from the ground up without end: distant" in notes(found)
-    unused = ed269(box(8.02, 47.0, **odd), name="odd", restriction="NO_RESTRICTION")
-    assert "restrict nothing: odd" in notes(mission(tmp_path, SHUT, unused))
+ODD = {"lowerLimit": 50, "upperVerticalReference": "QNE"}
+NEAR = ed269(box(8.02, 47.0, **ODD), name="near")
+BENT = ed269(
+    volume(horizontalProjection={"type": "Polygon", "coordinates": [[[8.005, 47.0], [8.03, 47.0], [8.02, 47.0]]]}),
+    name="bent",
+)
+LOST = ed269(volume(horizontalProjection={"type": "Circle", "center": [8.02, 47.0]}), name="lost")
+FAR_AWAY = ed269(box(40.0, 47.0, **ODD), name="far away")
+
+
+def test_limits_that_are_not_understood_count_from_the_ground_up_without_end(tmp_path: Path) -> None:
+    found = mission(tmp_path, SHUT, NEAR, FAR_AWAY)
+    [near] = [z for z in found.zones if z.name == "near"]
+    assert (near.floor, near.ceiling) == (None, None)
+    assert "they count from the ground up without end: near (upperLimit 120 M QNE cannot be read" in notes(found)
+    assert "not understood, and too far from the mission to matter: far away" in notes(found)
+    unused = ed269(box(8.02, 47.0, **ODD), name="odd", restriction="NO_RESTRICTION")
+    assert "restricts nothing: odd" in notes(mission(tmp_path, SHUT, unused))
+
+
+def test_a_kind_that_is_not_understood_is_no_fly_whichever_kinds_are(tmp_path: Path) -> None:
+    strange = ed269(box(8.02, 47.0), restriction=None, name="strange")
+    for entry in ({}, {"kinds": ["PROHIBITED"]}):
+        found = mission(tmp_path, SHUT, strange, entry=entry)
+        assert names(found) == {"shut", "strange"}
+        assert "strange (restriction must be text, given None)" in notes(found)
+
+
+@pytest.mark.parametrize(("zone", "place"), [(LOST, "nowhere"), (BENT, "here")])
+def test_an_outline_that_is_not_understood_refuses_where_it_may_lie(tmp_path: Path, zone: Any, place: str) -> None:
+    with pytest.raises(InputError, match=f"zone '{zone['name']}'"):
+        mission(tmp_path, SHUT, zone)
+    far = json.loads(json.dumps(zone).replace("8.0", "40.0"))
+    if place == "nowhere":
+        with pytest.raises(
+            InputError, match=r"a radius in metres, given None; or leave it out by name \(on_bad: skip\)"
+        ):
+            mission(tmp_path, SHUT, far)
+    else:
+        assert "too far from the mission to matter: bent" in notes(mission(tmp_path, SHUT, far))
+
+
+def test_a_mission_refuses_or_skips_what_is_not_understood(tmp_path: Path) -> None:
+    for zone in (NEAR, LOST, BENT, FAR_AWAY):
+        with pytest.raises(InputError, match=f"zone '{zone['name']}'"):
+            mission(tmp_path, SHUT, zone, entry={"on_bad": "refuse"})
+    with pytest.raises(InputError, match="zone 'lost'"):
+        mission(tmp_path, SHUT, LOST, entry={"on_bad": "strict"})
+    found = mission(tmp_path, SHUT, NEAR, LOST, BENT, entry={"on_bad": "skip"})
+    assert names(found) == {"shut", "near"}
+    assert "left out, because it is not understood: features[2].geometry[0]: zone 'lost'" in notes(found)
+    assert "left out, because their outlines are not understood: bent" in notes(found)
+    with pytest.raises(InputError, match="zone 'lost'"):
+        mission(tmp_path, LOST, entry={"on_bad": "skip"})  # nothing of the file is read
+    with pytest.raises(InputError, match=r"no_fly\[0\].ignore: is for files of your own"):
+        mission(tmp_path, SHUT, entry={"ignore": ["points"]})
+    with pytest.raises(InputError, match=r"no_fly\[0\].on_bad: belongs to a file"):
+        mission(tmp_path, no_fly=[{"center": [47.1, 8.1], "radius_m": 50, "on_bad": "skip"}])
+    with pytest.raises(InputError, match=r"no_fly\[0\].on_bad: must be one of refuse, strict, skip"):
+        mission(tmp_path, SHUT, entry={"on_bad": "ignore"})
 
 
 def test_the_options_of_check_judge_as_a_mission_file_does(tmp_path: Path) -> None:
@@ -152,9 +201,10 @@ def test_the_options_of_check_judge_as_a_mission_file_does(tmp_path: Path) -> No
     assert free in inputs["notes"]  # type: ignore[operator]
     mission(tmp_path, FREE, ed269(box(9.5, 47.0, upperVerticalReference="QNE")))
     OpenWorld(options).around([(47.0, 8.0), (47.02, 8.0)])
-    (tmp_path / "zones.json").write_text(json.dumps([ed269(box(8.0, 47.0, upperVerticalReference="QNE"))]))
-    with pytest.raises(InputError, match="QNE cannot be read as a level"):
+    (tmp_path / "zones.json").write_text(json.dumps([SHUT, BENT]))
+    with pytest.raises(InputError, match="zone 'bent'"):
         OpenWorld(options).around([(47.0, 8.0), (47.02, 8.0)])
+    OpenWorld(replace(options, on_bad="skip")).around([(47.0, 8.0), (47.02, 8.0)])
 
 
 def many(count: int, corners: int) -> list[Any]:
