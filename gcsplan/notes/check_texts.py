@@ -264,6 +264,11 @@ CHECK_TEXTS = {
         "inside the fence's area “{zone}” or its clearance (by {by_m:distance.2}) at {lat:.6f}, {lon:.6f}, "
         "{amsl_m:amsl.1}"
     ),
+    "rally_point_not_clear": "rally point {number}, where a return would land: {why}",
+    "rally_point_too_low": (
+        "rally point {number} is flown over at {level_m:amsl.1 down}, and the ground there reaches "
+        "{ground_m:amsl.1 up}: raise the point or the return altitude (by {by_m:height.1 up})"
+    ),
     "outside_fence_area": "leaves the fence's area “{zone}” (by {by_m:distance.1})",
     "far_outside_fence_area": "leaves the fence's area “{zone}”, which is far away",
     "climbs_too_steeply": (

@@ -65,7 +65,15 @@ INPUT_TEXTS = {
     "brings_fence": (
         "the file brings a fence of its own: {out} {out:area|areas} to stay out of, {inside} to stay inside of"
     ),
+    "brings_rally": (
+        "the file brings {count} {count:rally point|rally points} of its own, and with them on board a return leads to "
+        "the nearest of home and rally points"
+    ),
+    "rally_point_off_terrain": (
+        "rally point {number} lies at {lat:.6f}, {lon:.6f}, where the ground is not known: nothing about it is judged"
+    ),
     "no_zone_for_fence": "no zone can be sent as a fence: the fence on board is left as it is",
+    "no_rally_points_to_send": "there are no rally points to send: the list on board is left as it is",
     "flies_beyond_hours": (
         "the hours of zones: zones that do not apply from {hours} were left out, and the flight from then on: it lasts "
         "to {until}; write at: [from, to] with all of the flight in it"
@@ -94,8 +102,10 @@ INPUT_TEXTS = {
     "plan_fence_unread": "the file's {keys} is not read: {cure}",
     "plan_breach_return_unread": "the file's fence has a breach return point, which was not read",
     "plan_keys_unread": "these keys of the file were not read: {keys}",
-    "plan_list_not_sent": (
-        "the file's {key_of_list} ({count} {count:item|items}) is no part of the mission and is not sent with it"
+    "plan_list_not_sent": ("the file's {key_of_list} ({count} {count:item|items}) is not sent: {option} sends it, too"),
+    "plan_list_not_compared": (
+        "the file's {key_of_list} ({count} {count:item|items}) is not compared with the list on board: the mission "
+        "alone is"
     ),
     "complex_item_read": (
         "{entry} is a {kind}: it was read as the {count} {count:item|items} that it {landing:stands for|holds}"

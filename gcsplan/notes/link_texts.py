@@ -235,6 +235,7 @@ LINK_TEXTS = {
     ),
     # -- an upload or a comparison, by what was done before and after it --
     "fence_on_board": "a fence of {items} {items:item|items} is on board too, read back and compared",
+    "rally_on_board": "{items} {items:rally point is|rally points are} on board too, read back and compared",
     "judged_again_safe": "the mission on board is judged again: safe",
     "positions_shifted": (
         "{items} {items:item differs by|items differ by up to} {most_m:distance.3}; judged again: {safe:safe|not safe}"
