@@ -72,6 +72,14 @@ INPUT_TEXTS = {
     "rally_point_off_terrain": (
         "rally point {number} lies at {lat:.6f}, {lon:.6f}, where the ground is not known: nothing about it is judged"
     ),
+    "terrain_of_layers": (
+        "the terrain has layers, of which the finer counts where it is known: {layers}; at {nodes} "
+        "{nodes:node|nodes} beside seams and in coarser cells the ground lies between two heights, up to "
+        "{worst_m:height.2 up} apart"
+    ),
+    "unknown_is_sea": (
+        "{nodes} {nodes:node|nodes} without ground in the tiles {nodes:is|are} sea at 0 m, as `sea: true` states"
+    ),
     "no_zone_for_fence": "no zone can be sent as a fence: the fence on board is left as it is",
     "no_rally_points_to_send": "there are no rally points to send: the list on board is left as it is",
     "flies_beyond_hours": (
