@@ -78,7 +78,8 @@ INPUT_TEXTS = {
         "{worst_m:height.2 up} apart"
     ),
     "unknown_is_sea": (
-        "{nodes} {nodes:node|nodes} without ground in the tiles {nodes:is|are} sea at 0 m, as `sea: true` states"
+        "{nodes} {nodes:node|nodes} without ground in the tiles {nodes:is|are} at the level of the sea, as `sea: true` "
+        "states"
     ),
     "no_zone_for_fence": "no zone can be sent as a fence: the fence on board is left as it is",
     "no_rally_points_to_send": "there are no rally points to send: the list on board is left as it is",

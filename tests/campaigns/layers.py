@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import pyproj
 import rasterio
-from rasterio.transform import Affine
+from affine import Affine
 
 from gcsplan.world.geodesy.frame import Frame
 from gcsplan.world.terrain.terrain import TerrainSpec, load_terrain

@@ -46,7 +46,7 @@ def new(
         typer.Option(
             metavar="FILE",
             autocompletion=completion.dems,
-            help="The ground: a raster (.tif, .hgt, .asc) or sample:jacksboro; repeatable.",
+            help="The ground: a raster (.tif, .vrt, .hgt, .asc, …) or sample:jacksboro; repeatable.",
         ),
     ] = None,
     vertical_datum: DatumOption = None,

@@ -50,7 +50,7 @@ SharedNodes = tuple[int, int, int, int]
 HASHED_BYTES = 256 * 2**20
 """Tiles of more bytes together are not hashed whole."""
 
-RASTERS = (".tif", ".tiff", ".hgt", ".hgt.zip", ".asc")
+RASTERS = (".tif", ".tiff", ".hgt", ".hgt.zip", ".hgt.gz", ".dt0", ".dt1", ".dt2", ".asc")
 """The names of tiles in a folder end with these."""
 
 MOST_TILES = 20_000

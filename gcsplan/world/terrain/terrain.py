@@ -365,9 +365,8 @@ class _RasterTerrain:
 def _within(box: Box, parts: Sequence[Box]) -> Box:
     """The part of a box that the box around ``parts`` holds, too."""
     low, high = np.min(parts, axis=0), np.max(parts, axis=0)
-    return (
-        max(box[0], float(low[0])), max(box[1], float(low[1])), min(box[2], float(high[2])), min(box[3], float(high[3])),
-    )  # fmt: skip
+    west, south = max(box[0], float(low[0])), max(box[1], float(low[1]))
+    return west, south, min(box[2], float(high[2])), min(box[3], float(high[3]))
 
 
 def _datums(tiles: Sequence[Tiles], spec: TerrainSpec, where: str) -> list[VerticalDatum]:
