@@ -14,6 +14,10 @@ LINK_TEXTS = {
     "vehicle_state_not_told": "the vehicle does not report its state: whether it is ready could not be checked",
     "vehicle_in_trouble": "the vehicle reports that it is {state}",
     "armed_as_allowed": "the vehicle is armed, which was allowed",
+    "only_mavlink1": (
+        "only MAVLink 1 comes back from the vehicle: set SERIALn_PROTOCOL 2 (ArduPilot) or MAV_PROTO_VER 2 (PX4) on "
+        "board, or use a radio or router that passes MAVLink 2"
+    ),
     "capabilities_not_told": "the vehicle does not report its capabilities",
     "item_int_not_told": "the vehicle does not say that it takes MISSION_ITEM_INT",
     "terrain_ability_not_told": (
