@@ -553,6 +553,9 @@ CHECK_TEXTS = {
     "look_at_rally_points": (
         "look at each rally point before it is used: the terrain model knows no trees, wires, people or owners"
     ),
+    "rally_points_unjudged": (
+        "returns to the file's rally points are not judged beside a return along the mission: leave the points out"
+    ),
     "rally_points_of_px4": "the rally points are judged with RTL_TYPE 0: the nearest of home and rally points",
     "rally_points_of_ardupilot": (
         "the rally points are judged with RALLY_INCL_HOME 1 and RALLY_LIMIT_KM 0 (or {limit_km:.1f} at least): the "

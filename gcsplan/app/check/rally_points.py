@@ -22,7 +22,7 @@ from gcsplan.mission_file import VehicleRequest
 from gcsplan.notes.note import Finding, Note
 from gcsplan.world.world import World
 
-KINDS = frozenset({"zone", "coverage", "fence", "min_agl", "terrain_clearance"})
+AT_A_POINT = frozenset({"zone", "coverage", "fence", "min_agl", "terrain_clearance"})
 """Limits that count at a rally point: the way home judges how high a return may be."""
 
 
@@ -90,7 +90,7 @@ def _at(
     worst: dict[tuple[str, str], Finding] = {}
     for f in found:
         held = worst.get((f.kind, f.zone))
-        if f.kind in KINDS and not (held is not None and held.by >= f.by):
+        if f.kind in AT_A_POINT and not (held is not None and held.by >= f.by):
             worst[f.kind, f.zone] = f
     return [_of_point(number, f) for f in worst.values()]
 

@@ -65,7 +65,7 @@ def home_of(
 
     return way_home(
         verdict, request.vehicle, world, rtl_rel_home_m=request.rtl_rel_home_m, terrain_error_m=terrain_error_m,
-        route=request.return_route, points=points,
+        rally=not points, route=request.return_route, points=points,
     )  # fmt: skip
 
 

@@ -33,7 +33,7 @@ def against_fence(job: UploadJob, read_back: Mission, rtl_rel_home_m: float | No
 
 @dataclass(frozen=True, slots=True)
 class ListsSent:
-    """The lists that the user sends with missions. ``infinite``: zones with a height go into the fence, too."""
+    """The lists that the user sends with missions. ``infinite``: a fence into which zones with a height go, too."""
 
     fence: bool = False
     rally: bool = False
@@ -57,17 +57,19 @@ def with_lists(jobs: Sequence[UploadJob], sent: ListsSent) -> tuple[list[UploadJ
     notes: list[tuple[str, Note]] = []
     for job in jobs:
         own = job.own.get(FENCE, ())
-        if sent.fence:
+        fenced = sent.fence or sent.infinite
+        if fenced:
             fence = _fence_of(job, own, infinite=sent.infinite)
             found = fence.notes if fence.items else (*fence.notes, Note("no_zone_for_fence"))
             notes += [(job.name, note) for note in found]
             job = replace(job, fence=fence)
         if sent.rally:
             job = replace(job, rally=job.own.get(RALLY, ()))
-            notes += [] if job.rally else [(job.name, Note("no_rally_points_to_send"))]
+            none = RALLY in job.own and not job.rally
+            notes += [(job.name, Note("no_rally_points_to_send"))] if none else []
         unsent = [
             Note("plan_list_not_sent", key_of_list=KEY_OF_LIST[kind], count=len(items), option=option)
-            for kind, option, goes in ((FENCE, "--fence", sent.fence), (RALLY, "--rally", sent.rally))
+            for kind, option, goes in ((FENCE, "--fence", fenced), (RALLY, "--rally", sent.rally))
             if (items := job.own.get(kind, ())) and not goes
         ]
         made.append(replace(job, unsent=tuple(unsent)))

@@ -129,7 +129,7 @@ def jobs_of(
             v.name, where[v.name], v.mission, v.verdict, v.request.vehicle, plan.world, v.request.rtl_rel_home_m,
             source.terrain_error_m, way_home=homes.get(v.name), home_required=home_required, ground=ground,
             hours=hours_left(source, v, plan.fleet), fleet=fleet,
-            own={RALLY: rally_items(homes[v.name].rally)} if rally and v.name in homes else {},
+            own={RALLY: rally_items(homes[v.name].rally)} if rally and where[v.name] and v.name in homes else {},
         )
         for v in plan.vehicles if v.name in where
     ]  # fmt: skip

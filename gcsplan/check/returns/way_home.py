@@ -36,7 +36,7 @@ from gcsplan.check.motion.stretch import Flight, Place
 from gcsplan.check.returns.along_mission import return_by_mission
 from gcsplan.check.returns.footprint import Target, places_of_returns
 from gcsplan.check.returns.obstacles import CIRCLE_ABOVE_M, GradedObstacles, alike_in_width, obstacles_of_returns
-from gcsplan.check.returns.rally import Proposal, RallyReturns, propose, returns_to
+from gcsplan.check.returns.rally import Proposal, propose, returns_to
 from gcsplan.check.returns.refinement import CLEAR, LEGAL, SMALLEST_PART_M, Refinement, sizes_m
 from gcsplan.check.returns.return_targets import LANDS, joins_of
 from gcsplan.check.returns.stretches import rel_home, stretches_of
@@ -76,8 +76,8 @@ def way_home(
 
     ``rtl_rel_home_m`` is the vehicle's return altitude above home; None: the autopilot's default. ``rally``: propose
     rally points if no altitude is clear from every point. ``route``: straight home, or to where the return joins the
-    mission (`joins`); None: not given, which counts as straight home. ``points``: rally points on board: a return leads
-    to the nearest of home and these, and no others are proposed. Never raises for a mission that is merely unsafe.
+    mission (`joins`); None: not given, which counts as straight home. ``points``: rally points on board. Never raises for
+    a mission that is merely unsafe.
     """
     mission, rule = verdict.mission, RETURN_RULES[vehicle.autopilot]
     stored = replace(mission, items=tuple(profile_of(mission.autopilot).stored(item) for item in mission.items))
@@ -93,7 +93,7 @@ def way_home(
         why = unsure or Note("mission_not_followed" if trace is None else "home_not_on_ground")
         return _not_judged(verdict, vehicle, judged_m, rtl_rel_home_m is None, (why,))
     if route == "mission":
-        return _along_mission(verdict, vehicle, stored, flight, trace, judged_m)
+        return _beside(points, _along_mission(verdict, vehicle, stored, flight, trace, judged_m))
     home = (lat, lon, ground)
     east, north = (float(x) for x in world.frame.to_plane(lat, lon))
     target = Target(east, north, ground, ground)
@@ -103,8 +103,7 @@ def way_home(
     lowest_legal, highest_legal = _lowest(refinement, LEGAL, ground)
     unsafe = stretches_of(trace, refinement, CLEAR, level, target)
     irregular = stretches_of(trace, refinement, LEGAL, level, target, but=CLEAR)
-    proposes = rally and lowest is None and not points
-    proposal = propose(trace, refinement, target, vehicle, judged_m) if proposes else None
+    proposal = propose(trace, refinement, target, vehicle, judged_m) if rally and lowest is None else None
     unsafe_m = together_m((s.from_m, s.to_m) for s in unsafe)
     if proposal is not None and not proposal.points and _left_m(proposal) >= unsafe_m:
         # The proposal was looked at less closely than the altitude that was judged, which is as good.
@@ -112,8 +111,7 @@ def way_home(
     best_m = judged_m if not unsafe and not irregular else _whole(lowest_legal, highest_legal)
     if best_m is None:
         best_m = judged_m if not unsafe else _whole(lowest, highest)
-    notes = _notes(vehicle, judged_m, rtl_rel_home_m is None)
-    notes += _warnings(refinement, vehicle, ground, lowest)
+    notes = _notes(vehicle, judged_m, rtl_rel_home_m is None) + _warnings(refinement, vehicle, ground, lowest)
     straight = WayHome(
         vehicle=vehicle.name,
         autopilot=vehicle.autopilot,
@@ -142,23 +140,29 @@ def way_home(
         ),
         notes=tuple(notes + list(proposal.notes if proposal else ())),
     )
-    if not points:
-        return straight
-    kept = [profile_of(mission.autopilot).stored(point) for point in points]
-    return _to_points(straight, returns_to(trace, refinement, target, vehicle, kept, judged_m), verdict, vehicle, trace)
+    return _to_points(straight, points, verdict, vehicle, trace, refinement, target) if points else straight
+
+
+def _beside(points: Sequence[MissionItem], along: WayHome) -> WayHome:
+    """The way home along the mission, with rally points on board."""
+    return replace(along, not_judged=(*along.not_judged, Note("rally_points_unjudged"))) if points else along
 
 
 def _to_points(
     straight: WayHome,
-    returns: RallyReturns,
+    points: Sequence[MissionItem],
     verdict: Verdict,
     vehicle: Vehicle,
     trace: MissionTrace,
+    refinement: Refinement,
+    home: Target,
 ) -> WayHome:
     """The way home with rally points on board; ``straight`` is the one without them.
 
     No other altitude was looked for than the one that was judged.
     """
+    kept = [profile_of(vehicle.autopilot).stored(point) for point in points]
+    returns = returns_to(trace, refinement, home, vehicle, kept, straight.rtl_rel_home_m)
     unsafe = stretches_of(trace, returns.refinement, CLEAR, returns.refinement.start, None)
     irregular = stretches_of(trace, returns.refinement, LEGAL, returns.refinement.start, None, but=CLEAR)
     battery = battery_home(verdict, vehicle, straight.home, returns.highest_amsl_m)

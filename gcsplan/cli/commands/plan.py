@@ -199,12 +199,10 @@ def plan(
         orders: list[UploadJob] = []
         if upload or fence or fence_infinite:
             where = targets or dict.fromkeys((v.name for v in planned.vehicles), "")
-            required = is_required(source, require_way_home)
-            orders = uploads.jobs_of(planned, where, homes, required, rally=rally)
+            orders = uploads.jobs_of(planned, where, homes, is_required(source, require_way_home), rally=rally)
         list_notes: Sequence[tuple[str, Note]] = ()
         if orders:  # a fence that the mission would breach is refused before anything is written
-            lists = fencing.ListsSent(fence or fence_infinite, rally and bool(upload), fence_infinite)
-            orders, list_notes = fencing.with_lists(orders, lists)
+            orders, list_notes = fencing.with_lists(orders, fencing.ListsSent(fence, rally, fence_infinite))
         fences = {job.name: job.fence.items for job in orders if job.fence is not None}
         files = outputs.outputs_of(planned, homes, fences, rally=rally)
         if report:

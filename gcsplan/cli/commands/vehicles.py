@@ -134,8 +134,7 @@ def upload(
         job, notes = uploads.unchecked_job(files[0], to, sysid or 1)
         jobs = [job]
         say_notes(notes, Wording(units_of(units)))
-    sent = fencing.ListsSent(fence or fence_infinite, rally, fence_infinite)
-    jobs, list_notes = fencing.with_lists(jobs, sent)
+    jobs, list_notes = fencing.with_lists(jobs, fencing.ListsSent(fence, rally, fence_infinite))
     say_notes_of(list_notes, Wording(units_of(units)))
     names = [job.name for job in jobs]
     with talking(names), transfer_progress(names) as moved_on:

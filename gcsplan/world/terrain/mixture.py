@@ -25,11 +25,11 @@ from gcsplan.notes.note import Note
 from gcsplan.world.geometry.surface import GridMap
 from gcsplan.world.terrain.mosaic import FIT_ERROR_M, Window
 
-ALIKE = 1.5
+AS_FINE = 1.5
 """Layers whose cells differ by less than this factor are equally fine."""
 
 STRIP_CELLS = 1_000_000
-MOST_LINES = 16
+MOST_PATCHES = 16
 """Most patches of another layer beside each other in one cell of the finest one."""
 
 SEA_M = 0.0
@@ -37,7 +37,7 @@ _CORNERS = ((0, 0), (0, 1), (1, 0), (1, 1))
 
 
 @dataclass(frozen=True, slots=True)
-class Layer:
+class TerrainLayer:
     """A layer's window, the length of its cell, m, and the names of its files."""
 
     window: Window
@@ -51,7 +51,7 @@ def cell_m(window: Window) -> float:
     return float(window.grid.metres_per_cell(0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3])).max())
 
 
-def mixed(layers: Sequence[Layer], *, sea: bool = False) -> Window:
+def mixed(layers: Sequence[TerrainLayer], *, sea: bool = False) -> Window:
     """The window of the first layer, the finest, with the ground of all; ``sea``: where none knows it, it is at 0 m.
 
     ``layers`` are in the order of `finest_first`. Notes on the layers are taken over.
@@ -74,16 +74,16 @@ def mixed(layers: Sequence[Layer], *, sea: bool = False) -> Window:
     return _window(layers, target, high, low, sea=sea)
 
 
-def finest_first(layers: Sequence[Layer]) -> list[Layer]:
+def finest_first(layers: Sequence[TerrainLayer]) -> list[TerrainLayer]:
     """The layers by the length of their cells; equal ones stay in their order."""
     return sorted(layers, key=lambda layer: layer.cell_m)
 
 
-def _ranks(layers: Sequence[Layer]) -> list[list[Layer]]:
+def _ranks(layers: Sequence[TerrainLayer]) -> list[list[TerrainLayer]]:
     """Layers that are equally fine, from the finest on."""
-    ranks: list[list[Layer]] = []
+    ranks: list[list[TerrainLayer]] = []
     for layer in layers:
-        if ranks and layer.cell_m < ALIKE * ranks[-1][0].cell_m:
+        if ranks and layer.cell_m < AS_FINE * ranks[-1][0].cell_m:
             ranks[-1].append(layer)
         else:
             ranks.append([layer])
@@ -134,7 +134,7 @@ def _put(
 class _Other:
     """Another layer, as the cells of the target see it."""
 
-    def __init__(self, layer: Layer, target: Window, target_cell_m: float) -> None:
+    def __init__(self, layer: TerrainLayer, target: Window, target_cell_m: float) -> None:
         self.name = layer.name
         self.high = _Patches(layer.window.heights_m)
         self.low = self.high if layer.window.low_m is None else _Patches(layer.window.low_m)
@@ -173,7 +173,7 @@ class _Cells:
     """Cells of the target in the columns and rows of another layer.
 
     ``corners``: column and row of each corner; ``first``, ``last``: column and row of the patches that a cell touches;
-    ``steps``: how far column and row go along the cell's sides. Raises InputError beyond `MOST_LINES`.
+    ``steps``: how far column and row go along the cell's sides. Raises InputError beyond `MOST_PATCHES`.
     """
 
     def __init__(self, at: Floats, error: float, name: str) -> None:
@@ -186,7 +186,7 @@ class _Cells:
             np.maximum(np.floor(np.maximum.reduce(x) - error).astype(np.intp), first)
             for x, first in zip((c, r), self.first, strict=True)
         ]
-        if any(int((b - a).max()) >= MOST_LINES for a, b in zip(self.first, self.last, strict=True)):
+        if any(int((b - a).max()) >= MOST_PATCHES for a, b in zip(self.first, self.last, strict=True)):
             raise InputError(
                 f"{name} has cells that are much longer than wide, too unlike the finest terrain's: gdalwarp it to "
                 "square cells (-tr)"
@@ -278,7 +278,7 @@ class _Patches:
         return np.asarray((1.0 - v) * upper + v * ((1.0 - u) * z[j + 1, i] + u * z[j + 1, i + 1]))
 
 
-def _window(layers: Sequence[Layer], target: Window, high: Floats, low: Floats, *, sea: bool) -> Window:
+def _window(layers: Sequence[TerrainLayer], target: Window, high: Floats, low: Floats, *, sea: bool) -> Window:
     notes = [n for layer in layers for n in layer.window.notes if n.code != "nodes_unknown"]
     apart = high - low
     seams = int(np.count_nonzero(apart > 0.0))

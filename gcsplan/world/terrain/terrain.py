@@ -26,7 +26,7 @@ from gcsplan.world.geodesy.height_unit import METRE
 from gcsplan.world.geometry.surface import Surface
 from gcsplan.world.geometry.zones import Box
 from gcsplan.world.terrain.geoid import GeoidGrid
-from gcsplan.world.terrain.mixture import Layer, cell_m, finest_first, mixed
+from gcsplan.world.terrain.mixture import TerrainLayer, cell_m, finest_first, mixed
 from gcsplan.world.terrain.model_words import heights_read
 from gcsplan.world.terrain.mosaic import (
     Mosaic,
@@ -56,7 +56,7 @@ WIDER_M, WIDER_CELLS = (4000.0, 8000.0, 16_000.0, 32_000.0, 64_000.0, 120_000.0)
 STANDING, CANOPY, MIXED = 2, 4, 4
 """Arrays of a window that are held at once where obstacles of one height stand, with a canopy, or of several layers."""
 
-MOST_NAMED = 4
+FILES_NAMED = 4
 """Files of a layer that a note names."""
 
 GEOID_STEP_M = 100.0
@@ -184,7 +184,7 @@ def place(where: str, key: str) -> str:
     return where if where.startswith("-") else f"{where}.{key}" if where else key
 
 
-class _Source:
+class _TileSource:
     """Tiles on one grid, the datum of their heights, and the geoid with which these become heights above the sea."""
 
     def __init__(self, tiles: Tiles, spec: TerrainSpec, datum: VerticalDatum, where: str) -> None:
@@ -240,7 +240,7 @@ class _RasterTerrain:
         self._spec, self._where = spec, where
         self._info, self._notes = info, notes
         self._sources = [
-            _Source(t, spec, datum, where) for t, datum in zip(tiles, _datums(tiles, spec, where), strict=True)
+            _TileSource(t, spec, datum, where) for t, datum in zip(tiles, _datums(tiles, spec, where), strict=True)
         ]
         self._canopy: Mosaic | None = None
         if spec.canopy is not None:
@@ -323,22 +323,22 @@ class _RasterTerrain:
     def _mixes(self) -> bool:
         return len(self._sources) > 1 or self._spec.sea
 
-    def _window(self, frame: Frame, box: Box, most_cells: int) -> tuple[Window, list[_Source]]:
+    def _window(self, frame: Frame, box: Box, most_cells: int) -> tuple[Window, list[_TileSource]]:
         """The window with the ground of all sources, and those that are in it. Raises InputError if none is."""
         if not self._mixes:
             only = self._sources[0]
             return only.window(frame, box, spare_m=RASTER_SPARE_M, most_cells=most_cells), self._sources
         wide = box[0] - RASTER_SPARE_M, box[1] - RASTER_SPARE_M, box[2] + RASTER_SPARE_M, box[3] + RASTER_SPARE_M
         beside: NotCovered | None = None
-        found: list[tuple[Layer, _Source]] = []
+        found: list[tuple[TerrainLayer, _TileSource]] = []
         for source in self._sources:
             try:
                 window = source.window(frame, wide, spare_m=0.0, most_cells=most_cells)
             except NotCovered as why:
                 beside = beside or why
                 continue
-            name = ", ".join(r.name for r in source.tiles.rasters[:MOST_NAMED])
-            found.append((Layer(window, cell_m(window), name), source))
+            name = ", ".join(r.name for r in source.tiles.rasters[:FILES_NAMED])
+            found.append((TerrainLayer(window, cell_m(window), name), source))
         if not found:
             assert beside is not None
             raise beside

@@ -11,7 +11,7 @@ import pytest
 from gcsplan.errors import InputError
 from gcsplan.world.geodesy.frame import Frame
 from gcsplan.world.geometry.surface import GridMap
-from gcsplan.world.terrain.mixture import Layer, cell_m, finest_first, mixed
+from gcsplan.world.terrain.mixture import TerrainLayer, cell_m, finest_first, mixed
 from gcsplan.world.terrain.mosaic import Window
 from gcsplan.world.terrain.terrain import TerrainSpec, load_terrain
 from tests.campaigns.layers import BOX_M, LAT, LON, Layout, hills, layouts, run
@@ -24,9 +24,9 @@ def grid(cell: float, z: np.ndarray, west: float = 0.0, north: float = 0.0) -> W
     return Window(z, GridMap.affine(west, north, cell, cell), np.arange(cols), np.arange(rows), ())
 
 
-def layer(cell: float, z: np.ndarray, **at: float) -> Layer:
+def layer(cell: float, z: np.ndarray, **at: float) -> TerrainLayer:
     window = grid(cell, z, **at)
-    return Layer(window, cell_m(window), f"{cell:g} m")
+    return TerrainLayer(window, cell_m(window), f"{cell:g} m")
 
 
 @pytest.mark.parametrize("name", NAMES[0:1] + NAMES[3:4] + NAMES[5:6] + NAMES[7:8] + NAMES[9:])
@@ -103,4 +103,4 @@ def test_the_finest_comes_first_and_cells_that_are_much_too_long_are_refused() -
     long = Window(z, GridMap.affine(0.0, 0.0, 30.0, 0.05), np.arange(40), np.arange(40), ())
     z[0, 0] = np.nan
     with pytest.raises(InputError, match="much longer than wide"):
-        mixed([b, Layer(long, 30.0, "strips")])
+        mixed([b, TerrainLayer(long, 30.0, "strips")])
