@@ -76,8 +76,8 @@ def way_home(
 
     ``rtl_rel_home_m`` is the vehicle's return altitude above home; None: the autopilot's default. ``rally``: propose
     rally points if no altitude is clear from every point. ``route``: straight home, or to where the return joins the
-    mission (`joins`); None: not given, which counts as straight home. ``points``: rally points on board. Never raises for
-    a mission that is merely unsafe.
+    mission (`joins`); None: not given, which counts as straight home. ``points``: rally points on board. Never raises
+    for a mission that is merely unsafe.
     """
     mission, rule = verdict.mission, RETURN_RULES[vehicle.autopilot]
     stored = replace(mission, items=tuple(profile_of(mission.autopilot).stored(item) for item in mission.items))

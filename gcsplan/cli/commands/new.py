@@ -66,7 +66,9 @@ def new(
     ] = 60.0,
     max_agl: Annotated[
         float | None,
-        typer.Option(metavar="M", help="The legal ceiling above ground, often 120; on a terminal it is asked for."),
+        typer.Option(
+            metavar="M", help="The legal ceiling above ground, often 120; on a terminal the command asks for it."
+        ),
     ] = None,
     zones: Annotated[
         list[str] | None, typer.Option(metavar="FILE", help="No-fly zones in any format that is read; repeatable.")

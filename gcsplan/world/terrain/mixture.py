@@ -150,7 +150,7 @@ class _Other:
         self.error = (2.0 * FIT_ERROR_M + self.onto.error_m * target_cell_m) / layer.cell_m
 
     def put(self, high: Floats, low: Floats, open_: Bools, closed: Bools) -> None:
-        """Widen the heights by this layer in the ``open_`` cells; those that it knows all over are ``closed``."""
+        """Widen the heights by this layer in the ``open_`` cells, and mark as ``closed`` which of them it knows whole."""
         rows, cols = open_.shape
         step = max(1, STRIP_CELLS // cols)
         for first in range(0, rows, step):
@@ -219,7 +219,7 @@ class _Patches:
         bend_c, bend_r = np.zeros_like(z), np.zeros_like(z)
         bend_c[:, 1:-1] = np.abs(z[:, :-2] - 2.0 * z[:, 1:-1] + z[:, 2:])
         bend_r[1:-1] = np.abs(z[:-2] - 2.0 * z[1:-1] + z[2:])
-        # Of a line along a patch: the bend is linear between the patch's two nodes on it.
+        # Along a patch a line's bend is linear between the patch's two nodes on it.
         self.bend_c = np.nan_to_num(np.fmax(bend_c[:-1], bend_c[1:]))
         self.bend_r = np.nan_to_num(np.fmax(bend_r[:, :-1], bend_r[:, 1:]))
 

@@ -56,7 +56,7 @@ def discover_steps(
         yield started + timeout_s
         _note(channel, watch)
     found, requested, ask_at = clock(), 0, clock()
-    asked_at = answered_at = math.inf
+    first_at = answered_at = math.inf
     while True:
         now = clock()
         state = watch.state(now) or state
@@ -69,17 +69,17 @@ def discover_steps(
             yield now + ASK_AGAIN_S
         elif not complete and now >= ask_at and requested < times:
             _ask(channel, state)
-            asked_at = min(asked_at, now)
+            first_at = min(first_at, now)
             requested, ask_at = requested + 1, now + ASK_AGAIN_S
             if requested == times and state.capabilities is None and not is_generic(state.mav_autopilot):
-                ask_at = max(ask_at, asked_at + CAPABILITIES_S)
+                ask_at = max(ask_at, first_at + CAPABILITIES_S)
         elif not complete and now < ask_at:
             yield ask_at
         elif now < found + listen_s:
             yield found + listen_s
         else:
             known = requested and answered_at < math.inf
-            return replace(state, round_trip_s=answered_at - asked_at if known else 0.0)
+            return replace(state, round_trip_s=answered_at - first_at if known else 0.0)
         _note(channel, watch)
 
 
