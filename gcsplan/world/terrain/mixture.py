@@ -150,7 +150,7 @@ class _Other:
         self.error = (2.0 * FIT_ERROR_M + self.onto.error_m * target_cell_m) / layer.cell_m
 
     def put(self, high: Floats, low: Floats, open_: Bools, closed: Bools) -> None:
-        """Widen the heights by this layer in the ``open_`` cells, and mark as ``closed`` which of them it knows whole."""
+        """Widen the heights by this layer in the ``open_`` cells; cells that it knows whole become ``closed``."""
         rows, cols = open_.shape
         step = max(1, STRIP_CELLS // cols)
         for first in range(0, rows, step):

@@ -56,6 +56,9 @@ WIDER_M, WIDER_CELLS = (4000.0, 8000.0, 16_000.0, 32_000.0, 64_000.0, 120_000.0)
 STANDING, CANOPY, MIXED = 2, 4, 4
 """Arrays of a window that are held at once where obstacles of one height stand, with a canopy, or of several layers."""
 
+MOST_LAYERS = 20
+"""Most grids of one terrain: each is looked at all over the finest one."""
+
 FILES_NAMED = 4
 """Files of a layer that a note names."""
 
@@ -160,8 +163,14 @@ def open_terrain(spec: TerrainSpec, *, where: str) -> Terrain:
     at = place(where, "dem")
     rasters = _rasters(spec, at)
     require_known_units(rasters, at)
-    layers = [Mosaic(layer, where=at) for layer in layers_of(rasters)]
-    return _RasterTerrain(layers, spec, where, {}, ())
+    layers = layers_of(rasters)
+    if len(layers) > MOST_LAYERS:
+        raise InputError(
+            f"the files lie on {len(layers)} grids, more than {MOST_LAYERS}: bring them together (gdalwarp -tr, or "
+            "gdal_merge.py)",
+            where=at,
+        )
+    return _RasterTerrain([Mosaic(layer, where=at) for layer in layers], spec, where, {}, ())
 
 
 def terrain_of(

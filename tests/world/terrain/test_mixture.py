@@ -13,7 +13,7 @@ from gcsplan.world.geodesy.frame import Frame
 from gcsplan.world.geometry.surface import GridMap
 from gcsplan.world.terrain.mixture import TerrainLayer, cell_m, finest_first, mixed
 from gcsplan.world.terrain.mosaic import Window
-from gcsplan.world.terrain.terrain import TerrainSpec, load_terrain
+from gcsplan.world.terrain.terrain import TerrainSpec, load_terrain, open_terrain
 from tests.campaigns.layers import BOX_M, LAT, LON, Layout, hills, layouts, run
 
 NAMES = [layout.name for layout in layouts(1)]
@@ -104,3 +104,14 @@ def test_the_finest_comes_first_and_cells_that_are_much_too_long_are_refused() -
     z[0, 0] = np.nan
     with pytest.raises(InputError, match="much longer than wide"):
         mixed([b, TerrainLayer(long, 30.0, "strips")])
+
+
+def test_files_on_too_many_grids_are_refused_with_a_cure(tmp_path: Path) -> None:
+    file = replace(layouts(1)[0].files[0], half_m=100.0)
+    paths = []
+    for number in range(22):
+        one = replace(file, name=f"f{number}", cell=(file.cell[0] * (1.0 + 0.0137 * number), file.cell[1]))
+        one.write(tmp_path)
+        paths.append(str(one.path))
+    with pytest.raises(InputError, match="lie on 22 grids, more than 20: bring them together"):
+        open_terrain(TerrainSpec(dem=tuple(paths), vertical_datum="EGM96"), where="m")
