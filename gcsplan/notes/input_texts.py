@@ -122,6 +122,9 @@ INPUT_TEXTS = {
     "altitude_shown_is_not_sent": (
         "its Altitude of {shown_m:height} is not the one that is sent, params[6] {sent_m:height}"
     ),
+    "altitude_mode_is_not_sent": (
+        "its AltitudeMode {shown} says another reference of the altitude than frame {frame}, which is sent"
+    ),
     "item_without_place": "{entry} has no place: it was read as 0, 0, which ArduPilot takes for 'here'",
     "fence_without_heights": ("a fence has no height: {names} would be forbidden from the ground to the sky on board"),
     "fence_leaves_out": ("a fence has no height: {names} {names:is|are} left out of it, having a floor or a ceiling"),

@@ -357,7 +357,7 @@ class _Items:
         else:
             p1, p2, p3, p4, x, y, z = (math.nan if p is None else p for p in params)
             x, y = self._unset(command, frame, x, y, key)
-            self._compare_altitude(entry, z, key)
+            self._compare_altitude(entry, frame, z, key)
             item = read_item(
                 RawItem(command, frame, (p1, p2, p3, p4), x, y, z, goes_on), self.problems, f"{self.where}: {key}"
             )
@@ -367,13 +367,18 @@ class _Items:
         if len(self.problems) >= MAX_PROBLEMS:
             self._raise()
 
-    def _compare_altitude(self, entry: dict[str, Any], z: float, key: str) -> None:
-        """Note an altitude that QGroundControl shows and that is not the one which is sent, its last param."""
+    def _compare_altitude(self, entry: dict[str, Any], frame: float, z: float, key: str) -> None:
+        """Note an altitude, or its meaning, that QGroundControl shows and that is not what is sent."""
         mode, shown = entry.get("AltitudeMode"), json_float(entry.get("Altitude"))
         if mode == CALCULATED_ABOVE_TERRAIN:
             shown = json_float(entry.get("AMSLAltAboveTerrain"))
-        if mode in (*ALTITUDE_MODE.values(), CALCULATED_ABOVE_TERRAIN) and shown is not None and abs(shown - z) > 0.05:
+        known = mode in (None, *ALTITUDE_MODE.values(), CALCULATED_ABOVE_TERRAIN)
+        if known and shown is not None and abs(shown - z) > 0.05:
             self.notes.append(Note("altitude_shown_is_not_sent", place=key, shown_m=shown, sent_m=z))
+        sent = ALTITUDE_MODE.get(FRAME_SYNONYMS.get(int(frame), int(frame))) if math.isfinite(frame) else None
+        meant = ALTITUDE_MODE[GLOBAL] if mode == CALCULATED_ABOVE_TERRAIN else mode
+        if sent is not None and meant in ALTITUDE_MODE.values() and meant != sent:
+            self.notes.append(Note("altitude_mode_is_not_sent", place=key, shown=mode, frame=int(frame)))
 
     def _number(self, jump_id: object) -> None:
         number = whole(json_float(jump_id) or math.nan, 1, 2**31) if jump_id is not None else None
