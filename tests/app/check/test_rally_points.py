@@ -132,3 +132,32 @@ def test_returns_lead_to_the_nearest_rally_point(run: Any) -> None:
         ended, out, err = run("check", "m.yaml", "out/uav1.plan", "--require-way-home")
         assert ended == code, out + err
         assert ("no safe return" in out + err) == (code == 4)
+
+
+WALL = """version: 1
+name: wall
+terrain: {dem: sample:jacksboro}
+limits: {min_agl_m: 60, horizontal_clearance_m: 30, track_error_m: 3, altitude_error_m: 5}
+no_fly:
+  - {name: wall, center: [36.612, -84.345], radius_m: 900}
+vehicles:
+  - {name: uav1, sysid: 1, autopilot: arducopter, start: [36.6175, -84.3892], goal: [36.6133, -84.3000],
+     rtl_rel_home_m: 100}
+planner: {gap_percent: 5}
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("run", ["arducopter"], indirect=True)
+def test_proposed_points_are_sent_and_judged_again_as_the_plan_says(run: Any) -> None:
+    Path("m.yaml").write_text(WALL)
+    code, out, err = run("plan", "m.yaml", "-o", "out", "--rally", "--upload", "sim", "--json")
+    assert code == 0, err
+    (told,) = json.loads(out)["vehicles"]
+    count = len(told["way_home"]["rally"])
+    assert count > 0
+    assert told["upload"]["rally"] == {**told["upload"]["rally"], "verified": True, "items": count}
+    code, out, _ = run("check", "m.yaml", "out/uav1.plan", "--way-home", "--json")
+    again = json.loads(out)["verdicts"][0]
+    assert again["rally_points"] == count
+    assert again["way_home"]["no_return_m"] == pytest.approx(told["way_home"]["set_leaves_m"], abs=5.0)
