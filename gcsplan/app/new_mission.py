@@ -23,8 +23,9 @@ HOME_NEAR_M = 30.0
 OPTIONS = {
     "terrain": "--dem", "terrain.dem": "--dem", "terrain.vertical_datum": "--vertical-datum",
     "terrain.height_unit": "--height-unit", "terrain.nodata": "--nodata",
-    "terrain.flat_m": "--flat", "limits.min_agl_m": "--min-agl", "vehicles[0].start": "--start",
-    "vehicles[0].goal": "--goal",
+    "terrain.flat_m": "--flat", "limits.min_agl_m": "--min-agl", "limits.max_agl_m": "--max-agl",
+    "vehicles[0].start": "--start", "vehicles[0].goal": "--goal", "no_fly[0].file": "--zones",
+    "vehicles[0].energy.battery_wh": "--battery-wh",
 }  # fmt: skip
 """The option for each key that an option sets."""
 

@@ -46,12 +46,9 @@ def open_dem(spec: TerrainSpec, *, where: str) -> OpenTerrain:
     """Open what ``spec`` names; a published source is one name of `SOURCES`. Raises InputError."""
     named = [name for name in spec.dem if name in SOURCES]
     if not named:
-        if spec.sea:
-            raise InputError(
-                f"sea counts with a published source, which lists its tiles: dem: {' or '.join(SOURCES)}",
-                where=place(where, "sea"),
-            )
         paths = dat_files(spec.dem, where=place(where, "dem"))
+        if spec.sea and (paths or not spec.dem):
+            raise InputError("sea goes with rasters and published sources: remove it", where=place(where, "sea"))
         return DatTerrain(paths, spec, where=where) if paths else open_terrain(spec, where=where)
     if len(spec.dem) > 1:
         raise InputError(f"{named[0]} stands alone: no other tile beside it", where=place(where, "dem"))
@@ -83,7 +80,7 @@ class _SourceTerrain:
         sample = next(iter(tiles.values()), None)
         found = [tiles[c] if c in tiles else _sea(self._source, c, sample) for c in records if c in tiles or c in sea]
         # Ground that these sources publish at 0 m is sea: their voids are filled or declared.
-        spec = replace(self._spec, dem=(self._source.name,), nodata=NO_MORE_VOIDS)
+        spec = replace(self._spec, dem=(self._source.name,), nodata=NO_MORE_VOIDS, sea=False)
         info, notes = _reported(self._source, records, sea, absent)
         return terrain_of(Mosaic(found, where=at), spec, where=self._where, info=info, notes=notes)
 

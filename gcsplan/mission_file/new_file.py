@@ -7,7 +7,7 @@ import re
 import shlex
 import textwrap
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, get_args, get_origin
 
 from gcsplan.mission_file.json_schema import LATE_DEFAULTS, MODELINE, describe
@@ -40,7 +40,7 @@ name: {name}
 """
 _ZONES = """
 # {description} For example:
-#no_fly:
+{given}
 #  - {{name: village, center: [36.61, -84.31], radius_m: 400}}
 #  - {{name: mast, center: [36.585, -84.29], radius_m: 60, ceiling_agl_m: 110}}
 #  - {{file: zones.geojson}}
@@ -52,7 +52,9 @@ class Draft:
     """The parts of a new mission; places and files are text, as they will stand in the file.
 
     ``dem`` are rasters, relative to the mission file; without them the ground is flat at ``flat_m`` above sea level.
-    ``rtl_rel_home_m`` (m above home) and ``lean_deg`` are a vehicle's own settings, if they were read.
+    ``rtl_rel_home_m`` (m above home) and ``lean_deg`` are a vehicle's own settings, if they were read. ``others``:
+    start and goal of further vehicles, which count on from ``sysid``. ``zones``: files of no-fly zones. ``max_agl_m``
+    and ``battery_wh`` are left open if they are None.
     """
 
     start: str
@@ -68,6 +70,10 @@ class Draft:
     rtl_rel_home_m: float | None = None
     lean_deg: float | None = None
     link: str | None = None
+    others: tuple[tuple[str, str], ...] = ()
+    zones: tuple[str, ...] = ()
+    max_agl_m: float | None = None
+    battery_wh: float | None = None
 
 
 def place_text(text: str) -> str:
@@ -86,8 +92,13 @@ def text_of(draft: Draft, file: str, name: str) -> str:
     ]
     parts += _section("terrain", _terrain(draft))
     parts += _section("limits", _limits(draft))
-    parts.append(_ZONES.format(description=describe(MissionKeys, "no_fly")))
+    given = "\n".join(["no_fly:", *(f"  - {{file: {_word(zone)}}}" for zone in draft.zones)])
+    parts.append(_ZONES.format(description=describe(MissionKeys, "no_fly"), given=given if draft.zones else "#no_fly:"))
     parts += _section("vehicles", _vehicle(draft), dash=True)
+    for number, (start, goal) in enumerate(draft.others, start=1):
+        other = replace(draft, start=start, goal=goal, sysid=draft.sysid + number, link=None, rtl_rel_home_m=None)
+        made = [f"{key}: {value}" for _, key, value, is_made in _vehicle(other) if is_made]
+        parts += ["", *(f"  - {line}" if i == 0 else f"    {line}" for i, line in enumerate(made))]
     parts += _section("planner", _planner())
     parts.append("")
     for key, value in (("altitude_frame", "relative"), ("way_home", "reported")):
@@ -116,7 +127,13 @@ def _terrain(draft: Draft) -> Iterator[KeyRow]:
 def _limits(draft: Draft) -> Iterator[KeyRow]:
     wing = draft.autopilot is Autopilot.ARDUPLANE
     yield LimitKeys, "min_agl_m", f"{draft.min_agl_m:g}", True
-    yield LimitKeys, "max_agl_m", f"{2.0 * draft.min_agl_m:g}", False
+    ceiling_m = draft.max_agl_m
+    yield (
+        LimitKeys,
+        "max_agl_m",
+        f"{2.0 * draft.min_agl_m if ceiling_m is None else ceiling_m:g}",
+        ceiling_m is not None,
+    )
     yield LimitKeys, "max_amsl_m", "1500", False
     yield LimitKeys, "horizontal_clearance_m", "30", True
     yield LimitKeys, "track_error_m", "10" if wing else "3", True
@@ -151,7 +168,13 @@ def _vehicle(draft: Draft) -> Iterator[KeyRow]:
     yield VehicleKeys, "link", _word(draft.link or "udpout:127.0.0.1:14560"), draft.link is not None
     battery = {key: EnergyKeys.model_fields[key].default for key in ("vertical_j_per_m", "horizontal_j_per_m")}
     values = ", ".join(f"{key}: {value:g}" for key, value in battery.items())
-    yield VehicleKeys, "energy", f"{{{values}, battery_wh: 400, reserve: 0.2}}", False
+    wh = draft.battery_wh
+    yield (
+        VehicleKeys,
+        "energy",
+        f"{{{values}, battery_wh: {400 if wh is None else wh:g}, reserve: 0.2}}",
+        wh is not None,
+    )
 
 
 def _planner() -> Iterator[KeyRow]:

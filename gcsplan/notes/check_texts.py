@@ -264,6 +264,11 @@ CHECK_TEXTS = {
         "inside the fence's area “{zone}” or its clearance (by {by_m:distance.2}) at {lat:.6f}, {lon:.6f}, "
         "{amsl_m:amsl.1}"
     ),
+    "rally_point_not_clear": "rally point {number}, where a return would land: {why}",
+    "rally_point_too_low": (
+        "rally point {number} is flown over at {level_m:amsl.1 down}, and the ground there reaches "
+        "{ground_m:amsl.1 up}: raise the point or the return altitude (by {by_m:height.1 up})"
+    ),
     "outside_fence_area": "leaves the fence's area “{zone}” (by {by_m:distance.1})",
     "far_outside_fence_area": "leaves the fence's area “{zone}”, which is far away",
     "climbs_too_steeply": (
@@ -547,6 +552,9 @@ CHECK_TEXTS = {
     "no_rally_point_helps": "no rally point under the mission makes more of it safe",
     "look_at_rally_points": (
         "look at each rally point before it is used: the terrain model knows no trees, wires, people or owners"
+    ),
+    "rally_points_unjudged": (
+        "returns to the file's rally points are not judged beside a return along the mission: leave the points out"
     ),
     "rally_points_of_px4": "the rally points are judged with RTL_TYPE 0: the nearest of home and rally points",
     "rally_points_of_ardupilot": (

@@ -65,7 +65,24 @@ INPUT_TEXTS = {
     "brings_fence": (
         "the file brings a fence of its own: {out} {out:area|areas} to stay out of, {inside} to stay inside of"
     ),
+    "brings_rally": (
+        "the file brings {count} {count:rally point|rally points} of its own, and with them on board a return leads to "
+        "the nearest of home and rally points"
+    ),
+    "rally_point_off_terrain": (
+        "rally point {number} lies at {lat:.6f}, {lon:.6f}, where the ground is not known: nothing about it is judged"
+    ),
+    "terrain_of_layers": (
+        "the terrain has layers, of which the finer counts where it is known: {layers}; at {nodes} "
+        "{nodes:node|nodes} beside seams and in coarser cells the ground lies between two heights, up to "
+        "{worst_m:height.2 up} apart"
+    ),
+    "unknown_is_sea": (
+        "{nodes} {nodes:node|nodes} without ground in the tiles {nodes:is|are} at the level of the sea, as `sea: true` "
+        "states"
+    ),
     "no_zone_for_fence": "no zone can be sent as a fence: the fence on board is left as it is",
+    "no_rally_points_to_send": "there are no rally points to send: the list on board is left as it is",
     "flies_beyond_hours": (
         "the hours of zones: zones that do not apply from {hours} were left out, and the flight from then on: it lasts "
         "to {until}; write at: [from, to] with all of the flight in it"
@@ -94,14 +111,19 @@ INPUT_TEXTS = {
     "plan_fence_unread": "the file's {keys} is not read: {cure}",
     "plan_breach_return_unread": "the file's fence has a breach return point, which was not read",
     "plan_keys_unread": "these keys of the file were not read: {keys}",
-    "plan_list_not_sent": (
-        "the file's {key_of_list} ({count} {count:item|items}) is no part of the mission and is not sent with it"
+    "plan_list_not_sent": ("the file's {key_of_list} ({count} {count:item|items}) is not sent: {option} sends it, too"),
+    "plan_list_not_compared": (
+        "the file's {key_of_list} ({count} {count:item|items}) is not compared with the list on board: the mission "
+        "alone is"
     ),
     "complex_item_read": (
         "{entry} is a {kind}: it was read as the {count} {count:item|items} that it {landing:stands for|holds}"
     ),
     "altitude_shown_is_not_sent": (
         "its Altitude of {shown_m:height} is not the one that is sent, params[6] {sent_m:height}"
+    ),
+    "altitude_mode_is_not_sent": (
+        "its AltitudeMode {shown} says another reference of the altitude than frame {frame}, which is sent"
     ),
     "item_without_place": "{entry} has no place: it was read as 0, 0, which ArduPilot takes for 'here'",
     "fence_without_heights": ("a fence has no height: {names} would be forbidden from the ground to the sky on board"),

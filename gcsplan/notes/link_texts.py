@@ -14,6 +14,10 @@ LINK_TEXTS = {
     "vehicle_state_not_told": "the vehicle does not report its state: whether it is ready could not be checked",
     "vehicle_in_trouble": "the vehicle reports that it is {state}",
     "armed_as_allowed": "the vehicle is armed, which was allowed",
+    "only_mavlink1": (
+        "only MAVLink 1 comes back from the vehicle: set SERIALn_PROTOCOL 2 (ArduPilot) or MAV_PROTO_VER 2 (PX4) on "
+        "board, or use a radio or router that passes MAVLink 2"
+    ),
     "capabilities_not_told": "the vehicle does not report its capabilities",
     "item_int_not_told": "the vehicle does not say that it takes MISSION_ITEM_INT",
     "terrain_ability_not_told": (
@@ -235,6 +239,7 @@ LINK_TEXTS = {
     ),
     # -- an upload or a comparison, by what was done before and after it --
     "fence_on_board": "a fence of {items} {items:item|items} is on board too, read back and compared",
+    "rally_on_board": "{items} {items:rally point is|rally points are} on board too, read back and compared",
     "judged_again_safe": "the mission on board is judged again: safe",
     "positions_shifted": (
         "{items} {items:item differs by|items differ by up to} {most_m:distance.3}; judged again: {safe:safe|not safe}"

@@ -105,6 +105,10 @@ class Note:
         """The same note of a ``file``, ``place``, ``vehicle`` or ``zones``, which whoever made it did not know."""
         return Note(self.code, self.item, **{**place, **self.data})
 
+    def of_no_item(self) -> Note:
+        """The same note without its item and way, for what stands within another note."""
+        return Note(self.code, **{name: value for name, value in self.data.items() if name != "way"})
+
     def in_units(self, units: Units) -> str:
         """The sentence with its quantities in ``units``."""
         return self.text(Wording(units))

@@ -269,7 +269,6 @@ def test_a_mission_names_a_source(cache: Path) -> None:
         ({"crs": "EPSG:4326"}, r"terrain\.crs: copernicus-glo30 states it itself"),
         ({"height_unit": "ft"}, r"terrain\.height_unit: copernicus-glo30 states it itself"),
         ({"dem": ["copernicus-glo30", "more.tif"]}, r"terrain\.dem: copernicus-glo30 stands alone"),
-        ({"dem": "sample:jacksboro", "sea": True}, r"terrain\.sea: sea counts with a published source"),
         ({"dem": "copernicus-glo90"}, "copernicus-glo90 is not there"),
         ({"sea": "yes"}, r"terrain\.sea"),
     ],

@@ -134,6 +134,8 @@ def test_a_plan_with_places_in_coordinate_says_how_to_save_it_again() -> None:
         ({"Altitude": 50, "AltitudeMode": 3, "AMSLAltAboveTerrain": 170, "frame": 0}, ""),
         ({"Altitude": 50, "AltitudeMode": 3, "AMSLAltAboveTerrain": 400, "frame": 0}, "Altitude of 400 m"),
         ({"Altitude": None, "AltitudeMode": 1}, ""),
+        ({"Altitude": 50}, "Altitude of 50 m is not the one that is sent"),
+        ({"Altitude": 170, "AltitudeMode": 2}, "AltitudeMode 2 says another reference of the altitude than frame 3"),
         ({"Altitude": 50, "AltitudeMode": 0}, ""),
     ],
 )

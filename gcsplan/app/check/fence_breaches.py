@@ -35,23 +35,23 @@ FENCE_ROUNDING_M = 0.15
 
 
 def fence_for(
-    mission: Mission, vehicle: Vehicle, world: World, *, infinite: bool = False, rtl_rel_home_m: float | None = None
-) -> Fence:
-    """The fence that the world's zones make for ``mission``; see `fence_of` for ``infinite`` and for its notes.
+    mission: Mission, vehicle: Vehicle, world: World, *, infinite: bool = False, rtl_rel_home_m: float | None = None,
+    own: Sequence[MissionItem] = (),
+) -> Fence:  # fmt: skip
+    """The fence of ``mission``: the world's zones, and ``own``, the fence of its file; see `fence_of`.
 
     Raises CheckFailed if the mission itself would breach it, with zone and item; InputError if the autopilot cannot
     store or keep it.
     """
-    fence = fence_of(world.airspace.zones, world.frame, mission.autopilot, infinite=infinite)
+    fence = fence_of(world.airspace.zones, world.frame, mission.autopilot, infinite=infinite, own=own)
     try:
-        areas = fence_areas(fence, mission, world)
+        found = breaches_of(fence, mission, vehicle, world, rtl_rel_home_m=rtl_rel_home_m)
     except InputError as error:  # areas_of reads the items as stored, rounded to centimetres
         raise InputError(
             f"the fence would not be stored as it was made ({error.message}): a zone is too thin for it; widen the "
             "zone, or send no fence",
             where=vehicle.name,
         ) from None
-    found = breaches(areas, mission, vehicle, world, rtl_rel_home_m=rtl_rel_home_m)
     if found:
         cure = (
             "leave out --fence-infinite: those zones have a height, and a fence has none"
@@ -65,10 +65,37 @@ def fence_for(
     return fence
 
 
-def fence_areas(fence: Fence, mission: Mission, world: World) -> list[Area]:
-    """The areas of ``fence`` as the autopilot stores them, each with its zone's name."""
+def breaches_of(
+    fence: Fence,
+    mission: Mission,
+    vehicle: Vehicle,
+    world: World,
+    *,
+    rtl_rel_home_m: float | None = None,
+    tuning: Tuning = DEFAULTS,
+) -> list[Finding]:
+    """The breaches of ``fence``, as the autopilot stores it: of its zones' areas, and of a file's own areas.
+
+    Raises InputError for an area that is none as it is stored.
+    """
     areas = areas_of([profile_of(mission.autopilot).stored(item) for item in fence.items], world.frame)
-    return [replace(a, name=z.name) for a, z in zip(areas, fence.zones, strict=True)]
+    zones = [replace(a, name=z.name) for a, z in zip(areas, fence.zones, strict=False)]
+    found = breaches(zones, mission, vehicle, world, rtl_rel_home_m=rtl_rel_home_m, tuning=tuning)
+    own = areas[len(zones) :]
+    return found + breaches(own, mission, _plain(vehicle), world, rtl_rel_home_m=rtl_rel_home_m, tuning=tuning)
+
+
+def own_breaches(items: Sequence[MissionItem], mission: Mission, vehicle: Vehicle, world: World) -> list[Finding]:
+    """The breaches of a file's own fence. Raises InputError for an area that is none."""
+    return breaches(areas_of(items, world.frame), mission, _plain(vehicle), world)
+
+
+def _plain(vehicle: Vehicle) -> Vehicle:
+    """The vehicle as a file's own fence sees it, which acts at its border.
+
+    Only errors can carry the aircraft across, so the clearance from zones is left out.
+    """
+    return replace(vehicle, limits=replace(vehicle.limits, horizontal_clearance_m=0.0))
 
 
 def breaches(
@@ -173,13 +200,11 @@ def own_fence(
         return verdict, ()
     try:
         areas = areas_of(items, world.frame)
+        found = own_breaches(items, verdict.mission, vehicle, world) if verdict.legs else []
     except InputError as error:
         why = Note("fence_unread", why=error.message)
         return replace(verdict, not_judged=(*verdict.not_judged, why)), ()
     out = sum(not a.inclusion for a in areas)
     inside = len(areas) - out
     note = Note("brings_fence", out=out, inside=inside)
-    # A fence acts at its border. Only errors can carry the aircraft across, so the clearance from zones is left out.
-    plain = replace(vehicle, limits=replace(vehicle.limits, horizontal_clearance_m=0.0))
-    found = breaches(areas, verdict.mission, plain, world) if verdict.legs else []
     return replace(verdict, findings=(*verdict.findings, *found)), (note,)

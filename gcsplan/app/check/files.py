@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -67,7 +67,7 @@ def check_batch(source: MissionFile, arguments: Sequence[str], *, returns: Retur
     """
     for argument in arguments:
         match(source, argument)
-    both = Returns(returns.judged, is_required(source, returns.required))
+    both = replace(returns, required=is_required(source, returns.required))
     return check_at(MissionSite(source), source.name, arguments, VerdictParts(both))
 
 

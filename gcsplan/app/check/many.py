@@ -222,7 +222,7 @@ class Archive:
         """Files FILE or NAME=FILE in the world of a mission. Raises UsageError if a file's vehicle is not clear."""
         for argument in arguments:
             match(source, argument)
-        returns = Returns(returns.judged, is_required(source, returns.required))
+        returns = replace(returns, required=is_required(source, returns.required))
         return cls(
             source.name, ArchiveRequest(source.content, None, None, returns, shown), MissionSite(source), arguments
         )

@@ -18,6 +18,7 @@ from typing import Protocol
 import numpy as np
 
 from gcsplan.app.check.fence_breaches import own_fence
+from gcsplan.app.check.rally_points import own_rally
 from gcsplan.app.fleet.pipeline import world_of
 from gcsplan.app.plan.flight_hours import beyond_hours
 from gcsplan.app.plan.way_home import home_of
@@ -81,10 +82,14 @@ class Checked:
 
 @dataclass(frozen=True, slots=True)
 class Returns:
-    """Whether the way home is judged, and whether it must be safe, which means that it is judged too."""
+    """Whether the way home is judged, and whether it must be safe, which means that it is judged too.
+
+    ``rally``: the file's own rally points are judged, and returns lead to the nearest of home and these.
+    """
 
     judged: bool = False
     required: bool = False
+    rally: bool = True
 
 
 NO_RETURNS = Returns()
@@ -342,13 +347,15 @@ def judged(
     verdict, fence_notes = own_fence(read.fence, verdict, vehicle, world)
     more = [note for note in (read.unread_fence, beyond_hours(verdict, hours)) if note]
     verdict = replace(verdict, not_judged=(*verdict.not_judged, *more))
-    notes += fence_notes
+    points = read.rally if returns.rally else ()
+    verdict, rally_notes = own_rally(points, read.fence, verdict, request, world)
+    notes += [*fence_notes, *rally_notes]
     loops = any(note.code == "jumps_without_end" for note in verdict.notes)
     if verdict.legs and verdict.legs[-1].kind == "cruise" and not loops:
         notes.append(Note("ends_in_the_air"))
     home: WayHome | None = None
     if asks_home:
-        home = home_of(verdict, request, world, terrain_error_m)
+        home = home_of(verdict, request, world, terrain_error_m, points)
         notes += home.notes
     return Checked(
         file, vehicle, request, mission, verdict, tuple(notes), world, read.fence, read.rally, terrain_error_m, home,

@@ -7,14 +7,14 @@ judged. Otherwise the return is judged on request, and an unsafe one is a warnin
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from gcsplan.app.plan.model import Plan, VehiclePlan
 from gcsplan.check.verdict import Verdict
 from gcsplan.errors import CheckFailed, NoMission
-from gcsplan.mavlink.mission.mission import Mission
+from gcsplan.mavlink.mission.mission import Mission, MissionItem
 from gcsplan.mavlink.mission.return_parameters import (
     on_board,
     return_on_board_m,
@@ -50,13 +50,22 @@ def lets_fly(home: WayHome | None, *, required: bool) -> bool:
     return not required or (home is not None and home.safe is True)
 
 
-def home_of(verdict: Verdict, request: VehicleRequest, world: World, terrain_error_m: float) -> WayHome:
-    """The way home of one mission, from every point of it; takes about a second for 20 km."""
+def home_of(
+    verdict: Verdict,
+    request: VehicleRequest,
+    world: World,
+    terrain_error_m: float,
+    points: Sequence[MissionItem] = (),
+) -> WayHome:
+    """The way home of one mission, from every point of it; takes about a second for 20 km.
+
+    ``points``: the rally points on board, to the nearest of which, or home, a return leads.
+    """
     from gcsplan.check.returns.way_home import way_home
 
     return way_home(
         verdict, request.vehicle, world, rtl_rel_home_m=request.rtl_rel_home_m, terrain_error_m=terrain_error_m,
-        route=request.return_route,
+        rally=not points, route=request.return_route, points=points,
     )  # fmt: skip
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from gcsplan.arrays import Floats
 from gcsplan.check.returns.verdict import WayHome
 from gcsplan.check.verdict import Verdict
 from gcsplan.mavlink.build.fence import Fence
-from gcsplan.mavlink.mission.mission import Mission
+from gcsplan.mavlink.mission.mission import Mission, MissionItem
 from gcsplan.mavlink.protocol.machine import TransferProgress
 from gcsplan.mission_file import MissionFile
 from gcsplan.mission_file.published.times import Hours
@@ -132,9 +132,10 @@ class UploadJob:
     """One mission for one vehicle at one URL (`SIM` for a loopback vehicle of its own).
 
     ``way_home`` is None unless it was judged. ``home_required``: a vehicle that returns at another altitude is refused.
-    ``ground`` is sent to a vehicle that flies the terrain frame. ``hours``: the hours of the flight from its departure
-    on, if a zone was left out for them. ``fleet``: the other vehicles' motions, from which this one keeps apart as its
-    parameters make it fly.
+    ``fence`` and ``rally`` are sent before the mission. ``own``: the lists of its file, by kind; ``unsent`` names each
+    of them that is not sent. ``ground`` is sent to a vehicle that flies the terrain frame. ``hours``: the hours of the
+    flight from its departure on, if a zone was left out for them. ``fleet``: the other vehicles' motions, from which
+    this one keeps apart as its parameters make it fly.
     """
 
     name: str
@@ -151,6 +152,9 @@ class UploadJob:
     ground: GroundHeights | None = None
     hours: Hours | None = None
     fleet: FleetOnBoard | None = None
+    rally: tuple[MissionItem, ...] = ()
+    own: Mapping[int, tuple[MissionItem, ...]] = field(default_factory=dict)
+    unsent: tuple[Note, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -216,7 +216,7 @@ def _against_return(job: UploadJob, flies: Vehicle, verdict: Verdict) -> Note | 
     assert job.way_home is not None
     home = way_home(
         verdict, flies, job.world, rtl_rel_home_m=job.way_home.rtl_rel_home_m, terrain_error_m=job.terrain_error_m,
-        rally=False, route=job.way_home.route,
+        rally=False, route=job.way_home.route, points=job.rally,
     )  # fmt: skip
     return None if home.safe is True else Note("return_required_but", why=home.headline)
 

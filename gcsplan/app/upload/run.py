@@ -23,7 +23,7 @@ from gcsplan.app.check.files import check_files
 from gcsplan.app.check.worlds import Checked, split_name
 from gcsplan.app.plan.flight_hours import hours_left
 from gcsplan.app.plan.model import Plan
-from gcsplan.app.upload.fence import not_fenced, upload_fences
+from gcsplan.app.upload.fence import KEY_OF_LIST, NAME_OF_LIST, ListEnds, not_held, upload_lists
 from gcsplan.app.upload.job import (
     LINK,
     SIM,
@@ -112,11 +112,16 @@ def jobs_of(
     where: Mapping[str, str],
     homes: Mapping[str, WayHome] = MappingProxyType({}),
     home_required: bool = False,
+    *,
+    rally: bool = False,
 ) -> list[UploadJob]:
     """The upload jobs of a plan; vehicles without a target are left out.
 
-    ``homes``: ways home that were judged; ``home_required``: they must be safe.
+    ``homes``: ways home that were judged; ``home_required``: they must be safe. ``rally``: the points that they propose
+    are the lists of the jobs' files.
     """
+    from gcsplan.check.returns.rally import rally_items
+
     source = plan.source
     ground, fleet = MissionGround(source), FleetOnBoard(plan)
     return [
@@ -124,6 +129,7 @@ def jobs_of(
             v.name, where[v.name], v.mission, v.verdict, v.request.vehicle, plan.world, v.request.rtl_rel_home_m,
             source.terrain_error_m, way_home=homes.get(v.name), home_required=home_required, ground=ground,
             hours=hours_left(source, v, plan.fleet), fleet=fleet,
+            own={RALLY: rally_items(homes[v.name].rally)} if rally and where[v.name] and v.name in homes else {},
         )
         for v in plan.vehicles if v.name in where
     ]  # fmt: skip
@@ -146,7 +152,7 @@ def jobs_of_files(source: MissionFile, checked: Sequence[Checked], word: str) ->
 def _job(c: Checked, url: str) -> UploadJob:
     return UploadJob(
         c.vehicle.name, url, c.mission, c.verdict, c.vehicle, c.world, c.request.rtl_rel_home_m, c.terrain_error_m,
-        way_home=c.way_home, home_required=c.home_required, hours=c.hours,
+        way_home=c.way_home, home_required=c.home_required, hours=c.hours, own={FENCE: c.fence, RALLY: c.rally},
     )  # fmt: skip
 
 
@@ -163,7 +169,10 @@ def unchecked_job(argument: str, url: str, sysid: int) -> tuple[UploadJob, list[
         with open_link(url) as link:
             autopilot = _autopilot_of(link, sysid)
     read = read_mission_file(file, autopilot=autopilot)
-    job = UploadJob(name or file.stem, endpoint.url, replace(read.mission, name=name or file.stem, sysid=sysid))
+    job = UploadJob(
+        name or file.stem, endpoint.url, replace(read.mission, name=name or file.stem, sysid=sysid),
+        own={FENCE: read.fence, RALLY: read.rally},
+    )  # fmt: skip
     return job, [note for note in (*read.notes, read.unread_fence) if note]
 
 
@@ -217,10 +226,12 @@ def run_jobs(
             where = ", ".join(failed)
             held = LinkError(f"nothing was sent, all or nothing: the link {where} did not open")
             return [_result(job, failed.get(job.url) or held) for job in jobs]
-        fenced = _fenced(jobs, links, options)
-        barred = not_fenced(fenced)
+        listed = _lists_sent(jobs, links, options)
+        barred = not_held(listed)
         if barred and options.atomic:
-            held = LinkError("nothing was sent but fences, all or nothing: another vehicle's fence is not on board")
+            held = LinkError(
+                "nothing was sent but fences and rally points, all or nothing: another vehicle's are not on board"
+            )
             return [_result(job, barred.get(job.name) or held) for job in jobs]
         orders = {
             job.name: order_of(
@@ -237,13 +248,13 @@ def run_jobs(
         results = session.upload_fleet(list(orders.values()), ended=report_end(progress))
         ended = dict(zip(orders, results, strict=True))
         done = [
-            _with_fence(
+            _with_lists(
                 _result(
                     job,
                     ended.get(job.name) or barred.get(job.name) or failed.get(job.url)
                     or LinkError("the link did not open"),
                 ),
-                fenced.get(job.name),
+                listed.get(job.name, {}), job.unsent,
             )
             for job in jobs
         ]  # fmt: skip
@@ -363,10 +374,8 @@ def _apart(jobs: Sequence[UploadJob]) -> list[list[UploadJob]]:
     return groups
 
 
-def _fenced(
-    jobs: Sequence[UploadJob], links: Mapping[str, Link], options: UploadOptions
-) -> dict[str, UploadResult | GcsplanError]:
-    if not any(job.fence is not None for job in jobs):
+def _lists_sent(jobs: Sequence[UploadJob], links: Mapping[str, Link], options: UploadOptions) -> dict[str, ListEnds]:
+    if not any(job.fence is not None or job.rally for job in jobs):
         return {}
     from gcsplan.mavlink.link.session import session
 
@@ -374,24 +383,22 @@ def _fenced(
         allow_armed=options.allow_armed, ignore_position=options.ignore_position, listen_s=LISTEN_S,
         timeout_s=options.timeout_s,
     )  # fmt: skip
-    return upload_fences(jobs, links, settings)
+    return upload_lists(jobs, links, settings)
 
 
-def _with_fence(result: JobResult, fence: UploadResult | GcsplanError | None) -> JobResult:
-    if fence is None or isinstance(fence, GcsplanError):
-        return result
-    fence_result = {
-        "outcome": fence.outcome,
-        "verified": fence.verified,
-        "items": fence.items,
-        "seconds": fence.seconds,
-    }
-    note = Note("fence_on_board", items=fence.items)
-    return replace(
-        result,
-        warnings=tuple(dict.fromkeys((note, *result.warnings, *fence.warnings))),
-        details=dict(result.details or {}) | {"fence": fence_result},
-    )
+def _with_lists(result: JobResult, lists: ListEnds, unsent: Sequence[Note]) -> JobResult:
+    """The result with its fence and rally points, and the notes on its file's lists that were not sent."""
+    details, notes = dict(result.details or {}), list(unsent)
+    more: list[Note] = []
+    for kind, sent in lists.items():
+        if isinstance(sent, GcsplanError):
+            continue
+        details[NAME_OF_LIST[kind]] = {
+            "outcome": sent.outcome, "verified": sent.verified, "items": sent.items, "seconds": sent.seconds,
+        }  # fmt: skip
+        notes += [Note("fence_on_board" if kind == FENCE else "rally_on_board", items=sent.items)] * sent.verified
+        more += sent.warnings
+    return replace(result, warnings=tuple(dict.fromkeys((*notes, *result.warnings, *more))), details=details)
 
 
 def _result(job: UploadJob, ended: UploadResult | GcsplanError) -> JobResult:
@@ -458,11 +465,13 @@ def verify_file(
     with open_link(url) as link:
         if checked is not None:
             job, notes = _job(checked, link.url), checked.notes
+            own = dict(job.own)
         else:
             autopilot = None if file.suffix.lower() == ".plan" else _autopilot_of(link, sysid)
             read = read_mission_file(file, autopilot=autopilot)
             job = UploadJob(file.stem, link.url, replace(read.mission, sysid=sysid))
             notes = tuple(note for note in (*read.notes, read.unread_fence) if note)
+            own = {FENCE: read.fence, RALLY: read.rally}
         options = session.SessionOptions(
             listen_s=LISTEN_S, timeout_s=timeout_s, rtl_rel_home_m=job.rtl_rel_home_m,
             read_parameters=checked is not None, settings=settings_of(job), vehicle=job.vehicle,
@@ -473,7 +482,12 @@ def verify_file(
         done = _result(job, result)
     if checked is not None and done.verified and shifted is None:
         shifted = Note("judged_again_safe")
-    warnings = (*([] if shifted is None else [shifted]), *notes, *done.warnings)
+    left = [
+        Note("plan_list_not_compared", key_of_list=KEY_OF_LIST[kind], count=len(items))
+        for kind, items in own.items()
+        if items
+    ]
+    warnings = (*([] if shifted is None else [shifted]), *notes, *left, *done.warnings)
     return replace(done, message=done.message + cure if done.message else "", warnings=warnings)
 
 

@@ -57,6 +57,19 @@ class Proposal:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class RallyReturns:
+    """Returns to the nearest of home and rally points on board, and the highest altitude AMSL of one.
+
+    ``notes`` are the conditions under which they hold; ``unknown`` names points that are not judged.
+    """
+
+    refinement: Refinement
+    highest_amsl_m: float
+    notes: tuple[Note, ...]
+    unknown: tuple[Note, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class _Place:
     """A place to return to, the level of the return there, and the obstacles from the parts that it serves."""
 
@@ -115,13 +128,42 @@ def propose(
             used[0] = replace(place, level=level)
         else:
             used[i] = replace(place, level=_level_there(few, lengths, place.target, level, vehicle, ground))
-    closer = _judged_with(trace, vehicle, used, refinement)
+    closer = _judged_with(trace, vehicle, [(p.target, p.level) for p in used], refinement)
     left = stretches_of(trace, closer, CLEAR, closer.start, None)
     if not chosen:
         return Proposal((), level - ground, left, (Note("no_rally_point_helps"),))
     served_m = [float(size[nearest == i].sum()) for i in range(len(used))]
     points = tuple(_point(trace, p, m, vehicle, ground) for p, m in zip(used[1:], served_m[1:], strict=True))
     return Proposal(points, level - ground, left, _conditions(vehicle, float(apart.min(axis=0).max())))
+
+
+def returns_to(
+    trace: MissionTrace,
+    like: Refinement,
+    home: Target,
+    vehicle: Vehicle,
+    points: Sequence[MissionItem],
+    return_rel_home_m: float,
+) -> RallyReturns:
+    """The refined returns to the nearest of home and ``points``, rally points as the autopilot stores them."""
+    rally, ground = RETURN_RULES[vehicle.autopilot].rally, home.ground_amsl_m
+    level = ground + return_rel_home_m
+    places = [(home, level)]
+    surface, unknown = trace.world.airspace.surface, []
+    for number, point in enumerate(points, start=1):
+        east, north = (float(x) for x in trace.world.frame.to_plane(point.lat_deg, point.lon_deg))
+        under, own = float(surface.ground_at(east, north)), ground + point.z
+        if math.isnan(under):
+            unknown.append(Note("rally_point_off_terrain", number=number, lat=point.lat_deg, lon=point.lon_deg))
+            continue
+        at = {RallyAltitude.GROUND: own + return_rel_home_m, RallyAltitude.RAISES: max(level, own)}.get(rally, own)
+        tip = own if rally is RallyAltitude.GROUND else ground
+        places.append((Target(east, north, under, tip), at))
+    middle = trace.points(trace.cut(like.first_m).middle)[:, :2]
+    apart = np.min([np.hypot(*(middle - target.en).T) for target, _ in places], axis=0)
+    found = _judged_with(trace, vehicle, places, like, legal=True)
+    notes = _conditions(vehicle, float(apart.max(initial=0.0)))
+    return RallyReturns(found, max(at for _, at in places), notes, tuple(unknown))
 
 
 def _few_parts(trace: MissionTrace, home: Target, least_m: float) -> tuple[TraceParts, Floats]:
@@ -220,24 +262,35 @@ def _choose(away: Floats, safe: Bools, size: Floats) -> list[int]:
     return min((rows for m, rows in few if m >= best - WORTH_PART * total), key=len)
 
 
-def _judged_with(trace: MissionTrace, vehicle: Vehicle, places: Sequence[_Place], like: Refinement) -> Refinement:
-    """The refined returns to the nearest of ``places``; a part that may go to several must reach each of them."""
-    spots = np.array([p.target.en for p in places])
+def _judged_with(
+    trace: MissionTrace,
+    vehicle: Vehicle,
+    places: Sequence[tuple[Target, float]],
+    like: Refinement,
+    *,
+    legal: bool = False,
+) -> Refinement:
+    """The refined returns to the nearest of ``places``, each with the altitude AMSL of a return to it.
+
+    A part that may go to several must reach each of them. ``legal``: also by the grade `LEGAL`, else by `CLEAR` alone.
+    """
+    spots = np.array([target.en for target, _ in places])
 
     def judge(parts: TraceParts, whole: bool) -> GradedObstacles:
         middle = trace.points(parts.middle)[:, :2]
         apart = np.hypot(*(middle[:, None] - spots[None]).transpose(2, 0, 1))
         slack = (parts.size if whole else np.zeros(len(parts))) + 2.0 * trace.track_m[parts.stretch] + TIE_M
         may = apart <= apart.min(axis=1, keepdims=True) + slack[:, None]
-        obstacles, cost = [], 0
-        for j, place in enumerate(places):
+        clear, lawful, cost = [], [], 0
+        for j, (target, level) in enumerate(places):
             some = np.flatnonzero(may[:, j])
             if len(some):
-                found = obstacles_of_returns(trace, parts.take(some), place.target, vehicle, whole=whole)
+                found = obstacles_of_returns(trace, parts.take(some), target, vehicle, whole=whole)
                 cost += found.cost
-                obstacles.append(_failures(found.clear, place.level, some, len(parts)))
-        one = _on_one(obstacles, len(parts))
-        return GradedObstacles(one, one, cost)
+                clear.append(_failures(found.clear, level, some, len(parts)))
+                lawful += [_failures(found.legal, level, some, len(parts))] if legal else []
+        one = _on_one(clear, len(parts))
+        return GradedObstacles(one, _on_one(lawful, len(parts)) if legal else one, cost)
 
     return Refinement(trace, judge, like.start, (like.start,), 2.0 * like.first_m, 4.0 * like.smallest_m)
 

@@ -158,7 +158,8 @@ class WayHome:
     ``lowest_legal_rel_home_m``: the lowest that is legal from every point. ``unsafe``: where the return is not clear;
     ``irregular``: where it is clear but not legal. ``advised_rel_home_m``: the lowest clear altitude, or, if none is
     clear from every point, one that leaves little unsafe; ``rally``: points proposed for that case, to be judged with
-    it; ``left``: what stays unsafe even with them. ``profile``: in the order flown. ``lowest``: how near to the ground
+    it; ``left``: what stays unsafe even with them. ``profile``: in the order flown; empty if no other altitude than the
+    judged one was looked at. ``lowest``: how near to the ground
     the returns come at the judged altitude, None where that is unknown.
 
     ``path_safe`` is the verdict on the path itself. ``set_rel_home_m``: the altitude to set on the vehicle (with
@@ -317,9 +318,12 @@ class WayHome:
             out.append(ReturnRow("irregular", from_part if length >= 0.5 else Note("outside_limit_at", first=first)))
         if self.not_judged and not self.unsafe and self.lowest_rel_home_m is None:
             return out + self._last_rows()
+        if self.profile:  # else no other altitude was looked for
+            out += [
+                ReturnRow("clear", _altitudes(self.lowest_rel_home_m, self.highest_rel_home_m)),
+                ReturnRow("legal", _altitudes(self.lowest_legal_rel_home_m, None)),
+            ]
         out += [
-            ReturnRow("clear", _altitudes(self.lowest_rel_home_m, self.highest_rel_home_m)),
-            ReturnRow("legal", _altitudes(self.lowest_legal_rel_home_m, None)),
             *self._lowest(),
             *self._battery(),
         ]

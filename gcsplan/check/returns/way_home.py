@@ -17,6 +17,7 @@ mission are split where the lowest height is until it is known.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -35,7 +36,7 @@ from gcsplan.check.motion.stretch import Flight, Place
 from gcsplan.check.returns.along_mission import return_by_mission
 from gcsplan.check.returns.footprint import Target, places_of_returns
 from gcsplan.check.returns.obstacles import CIRCLE_ABOVE_M, GradedObstacles, alike_in_width, obstacles_of_returns
-from gcsplan.check.returns.rally import Proposal, propose
+from gcsplan.check.returns.rally import Proposal, propose, returns_to
 from gcsplan.check.returns.refinement import CLEAR, LEGAL, SMALLEST_PART_M, Refinement, sizes_m
 from gcsplan.check.returns.return_targets import LANDS, joins_of
 from gcsplan.check.returns.stretches import rel_home, stretches_of
@@ -45,7 +46,7 @@ from gcsplan.check.returns.words import together_m
 from gcsplan.check.verdict import Verdict
 from gcsplan.mavlink.mission.autopilots import profile_of
 from gcsplan.mavlink.mission.commands import command_name
-from gcsplan.mavlink.mission.mission import Mission
+from gcsplan.mavlink.mission.mission import Mission, MissionItem
 from gcsplan.mavlink.mission.return_parameters import ReturnRoute
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Vehicle
@@ -69,12 +70,14 @@ def way_home(
     terrain_error_m: float = TERRAIN_ERROR_M,
     rally: bool = True,
     route: ReturnRoute | None = None,
+    points: Sequence[MissionItem] = (),
 ) -> WayHome:
     """Judge the return home from every point of the mission of ``verdict``.
 
     ``rtl_rel_home_m`` is the vehicle's return altitude above home; None: the autopilot's default. ``rally``: propose
     rally points if no altitude is clear from every point. ``route``: straight home, or to where the return joins the
-    mission (`joins`); None: not given, which counts as straight home. Never raises for a mission that is merely unsafe.
+    mission (`joins`); None: not given, which counts as straight home. ``points``: rally points on board. Never raises
+    for a mission that is merely unsafe.
     """
     mission, rule = verdict.mission, RETURN_RULES[vehicle.autopilot]
     stored = replace(mission, items=tuple(profile_of(mission.autopilot).stored(item) for item in mission.items))
@@ -90,7 +93,7 @@ def way_home(
         why = unsure or Note("mission_not_followed" if trace is None else "home_not_on_ground")
         return _not_judged(verdict, vehicle, judged_m, rtl_rel_home_m is None, (why,))
     if route == "mission":
-        return _along_mission(verdict, vehicle, stored, flight, trace, judged_m)
+        return _beside(points, _along_mission(verdict, vehicle, stored, flight, trace, judged_m))
     home = (lat, lon, ground)
     east, north = (float(x) for x in world.frame.to_plane(lat, lon))
     target = Target(east, north, ground, ground)
@@ -108,9 +111,8 @@ def way_home(
     best_m = judged_m if not unsafe and not irregular else _whole(lowest_legal, highest_legal)
     if best_m is None:
         best_m = judged_m if not unsafe else _whole(lowest, highest)
-    notes = _notes(vehicle, judged_m, rtl_rel_home_m is None)
-    notes += _warnings(refinement, vehicle, ground, lowest)
-    return WayHome(
+    notes = _notes(vehicle, judged_m, rtl_rel_home_m is None) + _warnings(refinement, vehicle, ground, lowest)
+    straight = WayHome(
         vehicle=vehicle.name,
         autopilot=vehicle.autopilot,
         path_safe=verdict.safe,
@@ -138,6 +140,40 @@ def way_home(
         ),
         notes=tuple(notes + list(proposal.notes if proposal else ())),
     )
+    return _to_points(straight, points, verdict, vehicle, trace, refinement, target) if points else straight
+
+
+def _beside(points: Sequence[MissionItem], along: WayHome) -> WayHome:
+    """The way home along the mission, with rally points on board."""
+    return replace(along, not_judged=(*along.not_judged, Note("rally_points_unjudged"))) if points else along
+
+
+def _to_points(
+    straight: WayHome,
+    points: Sequence[MissionItem],
+    verdict: Verdict,
+    vehicle: Vehicle,
+    trace: MissionTrace,
+    refinement: Refinement,
+    home: Target,
+) -> WayHome:
+    """The way home with rally points on board; ``straight`` is the one without them.
+
+    No other altitude was looked for than the one that was judged.
+    """
+    kept = [profile_of(vehicle.autopilot).stored(point) for point in points]
+    returns = returns_to(trace, refinement, home, vehicle, kept, straight.rtl_rel_home_m)
+    unsafe = stretches_of(trace, returns.refinement, CLEAR, returns.refinement.start, None)
+    irregular = stretches_of(trace, returns.refinement, LEGAL, returns.refinement.start, None, but=CLEAR)
+    battery = battery_home(verdict, vehicle, straight.home, returns.highest_amsl_m)
+    short_m = 0.0 if battery is None else together_m(battery.short)
+    return replace(
+        straight, unsafe=unsafe, irregular=irregular, battery=battery, lowest_rel_home_m=None,
+        highest_rel_home_m=None, lowest_legal_rel_home_m=None, advised_rel_home_m=None,
+        set_rel_home_m=None if unsafe else straight.rtl_rel_home_m, set_leaves_m=None if unsafe else short_m,
+        profile=(), lowest=None, not_judged=(*straight.not_judged, *returns.unknown),
+        notes=(*straight.notes, *returns.notes),
+    )  # fmt: skip
 
 
 def _along_mission(

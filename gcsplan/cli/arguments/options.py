@@ -169,8 +169,13 @@ AtomicOption = Annotated[
     bool, typer.Option("--atomic", help="All or nothing: if one upload fails, clear what the other vehicles took.")
 ]
 FenceOption = Annotated[
-    bool, typer.Option("--fence", help="Send the zones as a fence first. Zones with a floor or a ceiling stay out.")
+    bool,
+    typer.Option(
+        "--fence",
+        help="First send the zones and the file's own fence as a fence. Zones with a floor or a ceiling stay out.",
+    ),
 ]
+RallyOption = Annotated[bool, typer.Option("--rally", help="First send the file's own rally points.")]
 FenceInfiniteOption = Annotated[
     bool, typer.Option("--fence-infinite", help="As --fence, with zones that have a height as if they had none.")
 ]

@@ -37,16 +37,22 @@ MOST_ATTEMPTS = 5
 
 def new(
     start: Annotated[
-        str | None,
-        typer.Option(metavar="LAT,LON", help="Where the vehicle takes off; also degrees with minutes, UTM, MGRS."),
+        list[str] | None,
+        typer.Option(
+            metavar="LAT,LON",
+            help="Where a vehicle takes off; also degrees with minutes, UTM, MGRS. Again for each further vehicle.",
+        ),
     ] = None,
-    goal: Annotated[str | None, typer.Option(metavar="LAT,LON", help="Where it flies to, in the same forms.")] = None,
+    goal: Annotated[
+        list[str] | None,
+        typer.Option(metavar="LAT,LON", help="Where it flies to, in the same forms; one for each --start."),
+    ] = None,
     dem: Annotated[
         list[str] | None,
         typer.Option(
             metavar="FILE",
             autocompletion=completion.dems,
-            help="The ground: a raster (.tif, .hgt, .asc) or sample:jacksboro; repeatable.",
+            help="The ground: a raster (.tif, .vrt, .hgt, .asc, …) or sample:jacksboro; repeatable.",
         ),
     ] = None,
     vertical_datum: DatumOption = None,
@@ -58,6 +64,18 @@ def new(
     min_agl: Annotated[
         float, typer.Option(metavar="M", help="Lowest height above the ground and what stands on it.")
     ] = 60.0,
+    max_agl: Annotated[
+        float | None,
+        typer.Option(
+            metavar="M", help="The legal ceiling above ground, often 120; on a terminal the command asks for it."
+        ),
+    ] = None,
+    zones: Annotated[
+        list[str] | None, typer.Option(metavar="FILE", help="No-fly zones in any format that is read; repeatable.")
+    ] = None,
+    battery_wh: Annotated[
+        float | None, typer.Option("--battery-wh", metavar="WH", help="The battery, in watt-hours: its use is checked.")
+    ] = None,
     autopilot: Annotated[
         str | None,
         typer.Option(
@@ -103,14 +121,20 @@ def new(
     kind = _autopilot(autopilot)
     asks = not as_json and on_a_terminal()
     seen: Seen | None = None if source is None else seen_at(source, sysid, kind)
-    where_from = start or (seen.start if seen is not None else None)
-    missing = [name for name, value in (("--start", where_from), ("--goal", goal)) if value is None]
+    starts, goals = list(start or ()), list(goal or ())
+    if max(len(starts), len(goals)) > 1 and (len(starts) != len(goals) or seen is not None):
+        words = "--from goes with one vehicle" if seen is not None else f"{len(starts)} --start, {len(goals)} --goal"
+        raise UsageError(f"{words}: give a --start and a --goal for each vehicle")
+    where_from = starts[0] if starts else seen.start if seen is not None else None
+    where_to = goals[0] if goals else None
+    missing = [name for name, value in (("--start", where_from), ("--goal", where_to)) if value is None]
     if not dem and flat is None:
         missing.append("--dem FILE (or --flat M: flat ground at that altitude, which is never assumed)")
     if missing and not asks:
         raise UsageError(f"give {', '.join(missing)} (see gcsplan new --help; on a terminal the command asks for them)")
     begin = _place("--start", where_from, "Start (LAT,LON)")
-    end = _place("--goal", goal, "Goal (LAT,LON)")
+    end = _place("--goal", where_to, "Goal (LAT,LON)")
+    others = [(_place("--start", a, ""), _place("--goal", b, "")) for a, b in zip(starts[1:], goals[1:], strict=False)]
     if not dem and flat is None:
         dem, flat = _ask("Ground (a raster, sample:jacksboro, or `flat 400` for 400 m above sea level)", _ground)
         if dem and vertical_datum is None and not dem[0].startswith("sample:"):
@@ -118,10 +142,15 @@ def new(
             vertical_datum = _ask(words, str.strip, default="") or None
     if kind is None and seen is None and asks and missing:
         kind = _ask(f"Autopilot ({', '.join(Autopilot)})", _autopilot, default="arducopter")
+    if max_agl is None and asks and missing:
+        words = "Legal ceiling in metres above ground (often 120; empty: none is kept)"
+        max_agl = _ask(words, _ceiling, default="")
     draft = Draft(
         start=begin, goal=end, dem=tuple(beside(d, out) for d in dem or ()), vertical_datum=vertical_datum,
         height_unit=height_unit, nodata=nodata, flat_m=flat,
         autopilot=seen.autopilot if seen else kind or Autopilot.ARDUCOPTER, sysid=sysid, min_agl_m=min_agl,
+        others=tuple(others), zones=tuple(beside(zone, out) for zone in zones or ()), max_agl_m=max_agl,
+        battery_wh=battery_wh,
     )  # fmt: skip
     draft = draft if seen is None else seen.onto(draft)
     text, notes = checked_text(draft, out)
@@ -185,6 +214,14 @@ def _ground(answer: str) -> tuple[list[str] | None, float | None]:
     if len(words) != 2 or not re.fullmatch(r"[-+]?\d+(\.\d+)?", words[1]):
         raise ValueError("flat ground needs its height above sea level in metres: flat 400")
     return None, float(words[1])
+
+
+def _ceiling(answer: str) -> float | None:
+    """A height, or none."""
+    words = answer.strip()
+    if words and not re.fullmatch(r"\d+(\.\d+)?", words):
+        raise ValueError("give metres above ground, or nothing")
+    return float(words) if words else None
 
 
 def _ask(question: str, read: Callable[[str], T], default: str | None = None) -> T:

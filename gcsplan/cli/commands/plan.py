@@ -113,7 +113,10 @@ def plan(
     require_way_home: RequireWayHomeOption = False,
     rally: Annotated[
         bool,
-        typer.Option("--rally", help="Write the rally points that the way home proposes into each .plan."),
+        typer.Option(
+            "--rally",
+            help="Write the rally points that the way home proposes into each .plan; with --upload, send them.",
+        ),
     ] = False,
     fence: Annotated[
         bool,
@@ -196,10 +199,10 @@ def plan(
         orders: list[UploadJob] = []
         if upload or fence or fence_infinite:
             where = targets or dict.fromkeys((v.name for v in planned.vehicles), "")
-            orders = uploads.jobs_of(planned, where, homes, is_required(source, require_way_home))
-        fence_notes: Sequence[tuple[str, Note]] = ()
-        if fence or fence_infinite:  # a fence that the mission would breach is refused before anything is written
-            orders, fence_notes = fencing.with_fences(orders, infinite=fence_infinite)
+            orders = uploads.jobs_of(planned, where, homes, is_required(source, require_way_home), rally=rally)
+        list_notes: Sequence[tuple[str, Note]] = ()
+        if orders:  # a fence that the mission would breach is refused before anything is written
+            orders, list_notes = fencing.with_lists(orders, fencing.ListsSent(fence, rally, fence_infinite))
         fences = {job.name: job.fence.items for job in orders if job.fence is not None}
         files = outputs.outputs_of(planned, homes, fences, rally=rally)
         if report:
@@ -214,7 +217,7 @@ def plan(
     if not as_json:
         plan_table(planned, homes, system)
         say_homes(homes, system)
-        _say_written(directory, list(files), fence_notes, system)
+        _say_written(directory, list(files), list_notes, system)
     results: list[JobResult] = []
     if targets:
         options = UploadOptions(

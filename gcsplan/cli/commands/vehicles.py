@@ -19,6 +19,7 @@ from gcsplan.cli.arguments.options import (
     JsonOption,
     ParametersOption,
     PlaceOption,
+    RallyOption,
     RequireWayHomeOption,
     SysidOption,
     TimeoutOption,
@@ -67,6 +68,7 @@ def upload(
     atomic: AtomicOption = False,
     fence: FenceOption = False,
     fence_infinite: FenceInfiniteOption = False,
+    rally: RallyOption = False,
     timeout: TimeoutOption = 60.0,
     as_json: JsonOption = False,
 ) -> None:
@@ -94,8 +96,8 @@ def upload(
         raise UsageError("give either --mission FILE, in whose world the files are checked, or --unchecked")
     if unchecked and at is not None:
         raise UsageError("--at decides which zones of a mission file count: give --mission FILE instead of --unchecked")
-    if unchecked and (fence or fence_infinite):
-        raise UsageError("--fence is made of the zones of a mission file: give --mission FILE instead of --unchecked")
+    if unchecked and fence_infinite:
+        raise UsageError("--fence-infinite is about the zones of a mission file: give --mission FILE, not --unchecked")
     if unchecked and (way_home or require_way_home):
         raise UsageError("the way home is judged in the world of a mission file: give --mission FILE, not --unchecked")
     options = UploadOptions(
@@ -108,9 +110,10 @@ def upload(
                 "--sysid goes with --unchecked: with --mission each vehicle's number is the mission file's"
             )
         source = pipeline.load_mission(mission, at=at)
+        returned = check_sites.Returns(way_home, require_way_home, rally=rally)
         uploads.targets([to], [r.vehicle for r in source.vehicles])  # report a wrong URL before any table
         with steady(check_sites.split_name(file)[1] for file in files):
-            checked = checking.check_files(source, files, returns=check_sites.Returns(way_home, require_way_home))
+            checked = checking.check_files(source, files, returns=returned)
         if not as_json:
             wording = Wording(units_of(units))
             for c in checked:
@@ -124,9 +127,6 @@ def upload(
         if not as_json:
             say_warnings(homes, Wording(units_of(units)))
         jobs = uploads.jobs_of_files(source, checked, to)
-        if fence or fence_infinite:
-            jobs, fence_notes = fencing.with_fences(jobs, infinite=fence_infinite)
-            say_notes_of(fence_notes, Wording(units_of(units)))
     else:
         if len(files) > 1:
             raise UsageError("--unchecked takes one FILE, for the vehicle --sysid; send the others one by one")
@@ -134,6 +134,8 @@ def upload(
         job, notes = uploads.unchecked_job(files[0], to, sysid or 1)
         jobs = [job]
         say_notes(notes, Wording(units_of(units)))
+    jobs, list_notes = fencing.with_lists(jobs, fencing.ListsSent(fence, rally, fence_infinite))
+    say_notes_of(list_notes, Wording(units_of(units)))
     names = [job.name for job in jobs]
     with talking(names), transfer_progress(names) as moved_on:
         results = uploads.run_jobs(jobs, options, moved_on, simulator=loopback_fleet)

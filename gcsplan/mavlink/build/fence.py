@@ -20,7 +20,7 @@ from gcsplan.errors import InputError
 from gcsplan.figures import counted
 from gcsplan.mavlink.mission.autopilots import max_items, profile_of
 from gcsplan.mavlink.mission.commands import CIRCLE_IN, CIRCLE_OUT, FENCE_RETURN_POINT, POLYGON_IN, POLYGON_OUT
-from gcsplan.mavlink.mission.mission import FENCE, GLOBAL, MissionItem, degrees_e7
+from gcsplan.mavlink.mission.mission import FENCE, GLOBAL, MissionItem, degrees_e7, float32
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot
 from gcsplan.world.geodesy.degree_shapes import LARGEST_RADIUS_M, near_circle, near_polygons, outline_of, unwrapped
@@ -53,7 +53,8 @@ class Area:
 class Fence:
     """A fence for one autopilot: its items in wire order, the zones in it, and ``notes`` for the user.
 
-    ``left_out`` names the zones that a fence cannot express.
+    The areas of ``zones`` come first; the areas behind them are a file's own. ``left_out`` names the zones that a fence
+    cannot express.
     """
 
     items: tuple[MissionItem, ...]
@@ -62,11 +63,19 @@ class Fence:
     notes: tuple[Note, ...] = ()
 
 
-def fence_of(zones: Sequence[Zone], frame: Frame, autopilot: Autopilot, *, infinite: bool = False) -> Fence:
-    """Return the fence that keeps an aircraft out of ``zones``.
+def fence_of(
+    zones: Sequence[Zone],
+    frame: Frame,
+    autopilot: Autopilot,
+    *,
+    infinite: bool = False,
+    own: Sequence[MissionItem] = (),
+) -> Fence:
+    """Return the fence that keeps an aircraft out of ``zones``, and all of ``own``, a file's own fence.
 
     Zones with a floor or a ceiling are left out and named; with ``infinite`` they are included without floor and
-    ceiling. A circle inside another one is dropped. Raises InputError if the autopilot cannot store the fence.
+    ceiling. A circle inside another one is dropped, and so is an area of ``own`` that is a zone's already. Raises
+    InputError if the autopilot cannot store the fence, or ``own`` has parts that are not whole.
     """
     notes: list[Note] = []
     bounded = [z for z in zones if z.floor is not None or z.ceiling is not None]
@@ -79,12 +88,39 @@ def fence_of(zones: Sequence[Zone], frame: Frame, autopilot: Autopilot, *, infin
     if inside:
         notes.append(Note("fence_circles_inside", names=_names(inside)))
     taken = [z for z in taken if z not in inside]
-    items: list[MissionItem] = []
-    for zone in taken:
-        items += _circle(zone.shape, frame) if isinstance(zone.shape, Circle) else _corners(zone, frame)
-    _require_storage(taken, items, autopilot)
+    parts = [tuple(_circle(z.shape, frame) if isinstance(z.shape, Circle) else _corners(z, frame)) for z in taken]
+    known = {tuple(map(_wire, part)) for part in parts}
+    more = [part for part in parts_of(own) if tuple(map(_wire, part)) not in known]
+    names = [f"the zone {z.name!r}" for z in taken] + [f"the file's own area {k}" for k in range(1, len(more) + 1)]
+    require_storage([*parts, *more], autopilot, names)
     left_out = () if infinite else tuple(z.name for z in bounded)
-    return Fence(tuple(items), tuple(taken), left_out, tuple(notes))
+    return Fence(tuple(item for part in (*parts, *more) for item in part), tuple(taken), left_out, tuple(notes))
+
+
+def parts_of(items: Sequence[MissionItem]) -> list[tuple[MissionItem, ...]]:
+    """The items of each area of a fence; return points (5000) are skipped. Raises InputError for one not whole."""
+    parts: list[tuple[MissionItem, ...]] = []
+    index = 0
+    while index < len(items):
+        item = items[index]
+        if item.command == FENCE_RETURN_POINT:
+            index += 1
+            continue
+        if item.command not in (CIRCLE_IN, CIRCLE_OUT, POLYGON_IN, POLYGON_OUT):
+            raise InputError(f"item {index} of the fence is command {item.command}, which no fence has")
+        count = 1.0 if item.command in (CIRCLE_IN, CIRCLE_OUT) else item.params[0]
+        corners = items[index : index + int(count)] if math.isfinite(count) and count >= 1 else []
+        whole = [c for c in corners if c.command == item.command and (count == 1 or c.params[0] == count)]
+        if len(whole) != count or (item.command in (POLYGON_IN, POLYGON_OUT) and count < 3):
+            raise InputError(f"item {index} of the fence begins a polygon of {count:g} corners that is not whole")
+        parts.append(tuple(whole))
+        index += len(whole)
+    return parts
+
+
+def _wire(item: MissionItem) -> tuple[int, float, int, int]:
+    """What an autopilot keeps of a fence's item."""
+    return item.command, float32(item.params[0]), item.x, item.y
 
 
 def areas_of(items: Sequence[MissionItem], frame: Frame) -> list[Area]:
@@ -95,20 +131,13 @@ def areas_of(items: Sequence[MissionItem], frame: Frame) -> list[Area]:
     """
     areas: list[Area] = []
     index = 0
-    while index < len(items):
-        item = items[index]
-        shapes: tuple[Circle | Polygon, ...]
-        if item.command == FENCE_RETURN_POINT:
-            index += 1
-            continue
-        if item.command in (CIRCLE_IN, CIRCLE_OUT):
-            count, shapes = 1, _circle_of(item, index, frame)
-        elif item.command in (POLYGON_IN, POLYGON_OUT):
-            count, shapes = _polygon_of(items, index, frame)
-        else:
-            raise InputError(f"item {index} of the fence is command {item.command}, which no fence has")
-        areas.append(Area(f"fence {len(areas) + 1}", shapes, item.command in (CIRCLE_IN, POLYGON_IN)))
-        index += count
+    for part in parts_of(items):
+        index = items.index(part[0], index)
+        command = part[0].command
+        circle = command in (CIRCLE_IN, CIRCLE_OUT)
+        shapes = _circle_of(part[0], index, frame) if circle else _polygon_of(part, index, frame)
+        areas.append(Area(f"fence {len(areas) + 1}", shapes, command in (CIRCLE_IN, POLYGON_IN)))
+        index += len(part)
     return areas
 
 
@@ -125,19 +154,13 @@ def _circle_of(item: MissionItem, index: int, frame: Frame) -> tuple[Circle, ...
     return () if circle is None else (circle,)
 
 
-def _polygon_of(items: Sequence[MissionItem], index: int, frame: Frame) -> tuple[int, tuple[Polygon, ...]]:
-    """Return the number of items of the polygon that begins at ``index``, and its parts near the frame's origin."""
-    first = items[index]
-    count = first.params[0]
-    corners = items[index : index + int(count)] if math.isfinite(count) and count >= 3 else []
-    whole = [c for c in corners if c.command == first.command and c.params[0] == count]
-    if len(whole) < 3 or len(whole) != count:
-        raise InputError(f"item {index} of the fence begins a polygon of {count:g} corners that is not whole")
-    places = [_corner(c, index + k) for k, c in enumerate(whole)]  # the wire has no longitudes past the antimeridian
+def _polygon_of(corners: Sequence[MissionItem], index: int, frame: Frame) -> tuple[Polygon, ...]:
+    """Return the parts near the frame's origin of the polygon that begins at ``index``."""
+    places = [_corner(c, index + k) for k, c in enumerate(corners)]  # the wire has no longitudes past the antimeridian
     ring, fault = outline_of([(float(lat), float(lon)) for lon, lat in unwrapped(places, places[0][1])])
     if fault:
         raise InputError(f"item {index} of the fence: {fault}")
-    return len(whole), tuple(near_polygons(ring, frame))
+    return tuple(near_polygons(ring, frame))
 
 
 def _corner(item: MissionItem, index: int) -> tuple[float, float]:
@@ -189,18 +212,16 @@ def _straightened(ring: Floats) -> Floats:
     return points[chosen] if len(chosen) >= 3 else ring
 
 
-def _require_storage(zones: Sequence[Zone], items: Sequence[MissionItem], autopilot: Autopilot) -> None:
+def require_storage(parts: Sequence[Sequence[MissionItem]], autopilot: Autopilot, names: Sequence[str]) -> None:
+    """Raise InputError if the autopilot cannot store a fence of these areas; ``names`` names them in messages."""
     label = profile_of(autopilot).label
     cure = "leave zones out, or join them into fewer and simpler ones"
-    for zone in zones:
-        if isinstance(zone.shape, Polygon) and autopilot.is_ardupilot:
-            count = len(_straightened(zone.shape.vertices))
-            if count > MOST_FENCE_CORNERS:
-                raise InputError(
-                    f"the zone {zone.name!r} has {count} corners; {label} keeps {MOST_FENCE_CORNERS}: {cure}"
-                )
-    circles = sum(isinstance(z.shape, Circle) for z in zones)
-    polygons = len(zones) - circles
+    items = [item for part in parts for item in part]
+    for part, name in zip(parts, names, strict=True):
+        if autopilot.is_ardupilot and len(part) > MOST_FENCE_CORNERS:
+            raise InputError(f"{name} has {len(part)} corners; {label} keeps {MOST_FENCE_CORNERS}: {cure}")
+    circles = sum(item.command in (CIRCLE_IN, CIRCLE_OUT) for item in items)
+    polygons = len(parts) - circles
     corners = len(items) - circles
     what = f"{counted(circles, 'circle')} and {counted(polygons, 'polygon')} with {counted(corners, 'corner')}"
     most = max_items(autopilot, FENCE)

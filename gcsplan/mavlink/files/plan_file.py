@@ -76,6 +76,13 @@ FIXED_WING, QUADROTOR = 1, 2  # MAV_TYPE
 CALCULATED_ABOVE_TERRAIN = 3  # QGroundControl's AltMode: sent above sea level
 ALTITUDE_MODE = {RELATIVE: 1, GLOBAL: 2, TERRAIN: 4}  # QGroundControl's AltMode; 0 is "mixed"
 MAX_PROBLEMS = 20
+STORED_WITH_ITEMS = ("survey", "CorridorScan", "fwLandingPattern", "vtolLandingPattern")
+"""Complex items that QGroundControl saves with what they stand for."""
+
+ITEMS_IN_NO_FILE = (
+    "no file holds its way points; send it to a vehicle with QGroundControl (`gcsplan sim` is one), and read it back "
+    "with `gcsplan download`, or make it of way points"
+)
 KEYS = frozenset({"fileType", "geoFence", "groundStation", "mission", "rallyPoints", "version"})
 MISSION_KEYS = frozenset({
     "cruiseSpeed", "firmwareType", "globalPlanAltitudeMode", "hoverSpeed", "items", "plannedHomePosition",
@@ -163,17 +170,21 @@ def parse_plan(text: str, *, autopilot: Autopilot | None, where: str, home_hint:
     if len(text) > MAX_FILE_BYTES:
         raise InputError(f"a mission file of more than {MAX_FILE_BYTES // 10**6} MB is not read", where=where)
     plan = _json(text.removeprefix("\ufeff"), where)
-    if not isinstance(plan, dict) or plan.get("fileType", "Plan") not in ("Plan", None):
-        raise InputError("a .plan file is a JSON object with fileType 'Plan', and this is none", where=where)
+    kind = plan.get("fileType") if isinstance(plan, dict) else None
+    if not isinstance(plan, dict) or kind not in ("Plan", None):
+        given = "" if kind is None else f" but one of {str(kind)[:40]!r}: give the file of the mission"
+        raise InputError(f"a .plan file is a JSON object with fileType 'Plan', and this is none{given}", where=where)
     # Mission Planner writes its .mission files in this form with mission version 0 and no item types.
     theirs = plan.get("groundStation") == "MissionPlanner"
     mission = plan.get("mission")
+    if mission is None and isinstance(plan.get("items"), list):
+        raise InputError(f"a .mission file of an old QGroundControl is not read: {RESAVE}, as a .plan", where=where)
     if not isinstance(mission, dict) or not isinstance(mission.get("items"), list):
         raise InputError("there must be a mission with a list of items", where=f"{where}: mission.items")
     for key, found, want in (("version", plan.get("version"), 1), ("mission.version", mission.get("version"), 2)):
         if found != want and not (theirs and found in (0, None)):
             raise InputError(
-                f"must be {want}, given {str(found)[:40]}; open the file in QGroundControl and save it again",
+                f"must be {want}, given {str(found)[:40]}; {RESAVE}",
                 where=f"{where}: {key}",
             )
     notes: list[Note] = []
@@ -192,9 +203,6 @@ def parse_plan(text: str, *, autopilot: Autopilot | None, where: str, home_hint:
     others = [*(k for k in plan if k not in KEYS), *(f"mission.{k}" for k in mission if k not in MISSION_KEYS)]
     if others and not theirs:
         notes.append(Note("plan_keys_unread", keys=tuple(k[:40] for k in others[:8])))
-    for key, own in (("geoFence", fence), ("rallyPoints", rally)):
-        if own:
-            notes.append(Note("plan_list_not_sent", key_of_list=key, count=len(own)))
     unread = Note("plan_fence_unread", keys=unread_fence, cure=RESAVE) if unread_fence else None
     return MissionFileRead(Mission(pilot, home, items), tuple(notes), fence, rally, unread)
 
@@ -318,7 +326,8 @@ class _Items:
         if name in LANDING_PATTERNS:
             inner, where = landing_entries(entry), key
         if not isinstance(inner, list) or not inner:
-            self._bad(key, f"a complex item ({name}) without its single items cannot be read; make it of way points")
+            cure = RESAVE if isinstance(style, dict) or name in STORED_WITH_ITEMS else ITEMS_IN_NO_FILE
+            self._bad(key, f"a complex item ({name}) without its single items cannot be read: {cure}")
             return
         self.notes.append(Note("complex_item_read", entry=key, kind=name, count=len(inner), landing=where == key))
         for index, part in enumerate(inner):
@@ -348,7 +357,7 @@ class _Items:
         else:
             p1, p2, p3, p4, x, y, z = (math.nan if p is None else p for p in params)
             x, y = self._unset(command, frame, x, y, key)
-            self._compare_altitude(entry, z, key)
+            self._compare_altitude(entry, frame, z, key)
             item = read_item(
                 RawItem(command, frame, (p1, p2, p3, p4), x, y, z, goes_on), self.problems, f"{self.where}: {key}"
             )
@@ -358,13 +367,18 @@ class _Items:
         if len(self.problems) >= MAX_PROBLEMS:
             self._raise()
 
-    def _compare_altitude(self, entry: dict[str, Any], z: float, key: str) -> None:
-        """Note an altitude that QGroundControl shows and that is not the one which is sent, its last param."""
+    def _compare_altitude(self, entry: dict[str, Any], frame: float, z: float, key: str) -> None:
+        """Note an altitude, or its meaning, that QGroundControl shows and that is not what is sent."""
         mode, shown = entry.get("AltitudeMode"), json_float(entry.get("Altitude"))
         if mode == CALCULATED_ABOVE_TERRAIN:
             shown = json_float(entry.get("AMSLAltAboveTerrain"))
-        if mode in (*ALTITUDE_MODE.values(), CALCULATED_ABOVE_TERRAIN) and shown is not None and abs(shown - z) > 0.05:
+        known = mode in (None, *ALTITUDE_MODE.values(), CALCULATED_ABOVE_TERRAIN)
+        if known and shown is not None and abs(shown - z) > 0.05:
             self.notes.append(Note("altitude_shown_is_not_sent", place=key, shown_m=shown, sent_m=z))
+        sent = ALTITUDE_MODE.get(FRAME_SYNONYMS.get(int(frame), int(frame))) if math.isfinite(frame) else None
+        meant = ALTITUDE_MODE[GLOBAL] if mode == CALCULATED_ABOVE_TERRAIN else mode
+        if sent is not None and meant in ALTITUDE_MODE.values() and meant != sent:
+            self.notes.append(Note("altitude_mode_is_not_sent", place=key, shown=mode, frame=int(frame)))
 
     def _number(self, jump_id: object) -> None:
         number = whole(json_float(jump_id) or math.nan, 1, 2**31) if jump_id is not None else None

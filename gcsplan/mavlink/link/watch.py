@@ -94,6 +94,7 @@ class VehicleState:
     under this system id; more than one means several vehicles with the same id. ``texts``: its last status texts.
     ``beat_at`` and ``placed_at``: times of the last heartbeat and position (clock of the link; -inf: never).
     ``just_at``: another position reported within `FRESH_S`, too far away for the vehicle to have moved there.
+    ``mavlink1``: its last message came in MAVLink 1. ``round_trip_s``: how long its first answer took; 0: not known.
     """
 
     address: Address
@@ -113,6 +114,8 @@ class VehicleState:
     placed_at: float = -math.inf
     just_at: VehiclePosition | None = None
     flight_sw_version: int | None = None
+    mavlink1: bool = False
+    round_trip_s: float = 0.0
 
     @property
     def what(self) -> str:
@@ -186,6 +189,7 @@ class _Reports:
     capabilities: int | None = None
     version: int | None = None
     home: Home | None = None
+    mavlink1: bool = False
     first: float = 0.0
     at: float = 0.0
 
@@ -221,6 +225,7 @@ class Watch:
             self._note_against(heard, kind, now)
             return
         reports = self._voice((heard.source.compid, heard.peer), now)
+        reports.mavlink1 = is_mavlink1(heard.message)
         if kind in _CLOCKS and heard.message.time_boot_ms:
             reports.clocks.setdefault(kind, _Clock()).note(heard.message.time_boot_ms / 1e3, now)
         if kind == "HEARTBEAT":
@@ -286,6 +291,7 @@ class Watch:
             lat, lon, amsl, reports.capabilities, self._rivals(best[:2]), reports.home, tuple(self.texts),
             best[1], source.at, reports.placed_at,
             reports.leapt_from if now - reports.leapt_at <= FRESH_S else None, reports.version,
+            reports.mavlink1,
         )  # fmt: skip
 
     def alike(self) -> bool:
@@ -353,6 +359,12 @@ class Watch:
         text = m.text if isinstance(m.text, str) else bytes(m.text).decode(errors="replace")
         self.texts_heard += 1
         self.texts.append("".join(c for c in text if c.isprintable()).strip())
+
+
+def is_mavlink1(message: Any) -> bool:
+    """Whether a message came in a frame of MAVLink 1; False for one that came in none."""
+    frame = message.get_msgbuf()
+    return bool(frame) and frame[0] == dialect.PROTOCOL_MARKER_V1
 
 
 def _is_autopilot(compid: int, source: _Source) -> bool:

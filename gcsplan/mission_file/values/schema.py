@@ -100,7 +100,7 @@ class TerrainKeys(Keys):
         ]
         | None
     ) = None
-    """A raster (.tif, .hgt, .hgt.zip, .asc), ArduPilot's .DAT (a file or folder), a list, a sample or a source."""
+    """A raster, ArduPilot's .DAT (a file or folder), a list of which the finest counts, a sample or a source."""
     vertical_datum: Text | None = None
     """The zero of heights: `EGM96`, `NAVD88`, `WGS84` (ellipsoidal), …; required if the raster does not state it."""
     geoid_grid: Text | None = None
@@ -122,7 +122,7 @@ class TerrainKeys(Keys):
     canopy_nodata_m: Annotated[float, Field(ge=0.0, le=250.0)] | None = None
     """Height of canopy cells without data; if absent, the ground there is unknown."""
     sea: bool = False
-    """With a source of `dem fetch`: tiles that it does not publish are sea at 0 m, even if GLO-90 shows land there."""
+    """Ground that no tile knows is sea at 0 m: tiles that a source has not, or what your own tiles do not know."""
 
 
 class LimitKeys(Keys):

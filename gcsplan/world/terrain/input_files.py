@@ -45,7 +45,7 @@ FENCE_ZONES = (".fen", ".poly", ".waypoints")
 ZONES_BY_NAME = (*(ending for ending in ZONE_FILES if ending != ".json"), ".fen", ".poly")
 """Zones by their names alone: JSON holds much else."""
 
-TERRAIN_FILES = (".tif", ".tiff", ".hgt", ".asc", ".dat")
+TERRAIN_FILES = (".tif", ".tiff", ".vrt", ".hgt", ".asc", ".dat", ".dt0", ".dt1", ".dt2", ".img", ".nc", ".xyz")
 LOG_FILES = (".bin", ".tlog", ".ulg")
 VEHICLE_FILES = (".waypoints", ".plan")
 MISSION_FILES = (".yaml", ".yml")

@@ -50,7 +50,7 @@ SharedNodes = tuple[int, int, int, int]
 HASHED_BYTES = 256 * 2**20
 """Tiles of more bytes together are not hashed whole."""
 
-RASTERS = (".tif", ".tiff", ".hgt", ".hgt.zip", ".asc")
+RASTERS = (".tif", ".tiff", ".hgt", ".hgt.zip", ".hgt.gz", ".dt0", ".dt1", ".dt2", ".asc")
 """The names of tiles in a folder end with these."""
 
 MOST_TILES = 20_000
@@ -100,6 +100,10 @@ class _Layout:
         return np.asarray((x - self.x0) / self.dx), np.asarray((self.y0 - y) / self.dy)
 
 
+class NotCovered(InputError):
+    """No tile meets a mission's box."""
+
+
 class Mosaic:
     """Tiles with one coordinate system and one grid. Raises InputError if they differ.
 
@@ -112,29 +116,14 @@ class Mosaic:
         self.where = where
         first = self.rasters[0]
         self.crs = first.crs
-        for other in self.rasters[1:]:
-            if other.crs.horizontal != first.crs.horizontal:
-                raise InputError(
-                    f"the tiles must share one coordinate system: {first.name} is in "
-                    f"{first.crs.horizontal.name!r}, {other.name} in {other.crs.horizontal.name!r}; gdalwarp one of "
-                    "them",
-                    where=where,
-                )
-            span = max(first.cols, first.rows, other.cols, other.rows)
-            off = abs(other.dx / first.dx / _ratio(other, first) - 1.0)
-            if max(off, abs(other.dy / first.dy - 1.0)) * span > ALIGNED_CELLS:
-                raise InputError(
-                    f"the tiles must share one resolution: {first.name} has cells of {first.dx:g} × {first.dy:g}, "
-                    f"{other.name} of {other.dx:g} × {other.dy:g}; bring them together with gdalwarp -tr",
-                    where=where,
-                )
-            if other.vertical != first.vertical:
-                raise InputError(
-                    f"the tiles must share one vertical datum: {first.name} states {_datum(first)}, {other.name} "
-                    f"{_datum(other)}; correct the one that is wrong (gdal_edit.py -a_srs)",
-                    where=where,
-                )
-        _require_known_units(self.rasters, where)
+        other = next((r for r in self.rasters if not _on_one_grid(r, first)), None)
+        if other is not None:
+            raise InputError(
+                f"the tiles must share one coordinate system, vertical datum and grid: {other.name} has another than "
+                f"{first.name}",
+                where=where,
+            )
+        require_known_units(self.rasters, where)
         self._degrees = to_wgs84(first.crs.horizontal, where=where)
         self._layout(0.0)  # finds tiles off the common grid before anything is read
 
@@ -169,12 +158,14 @@ class Mosaic:
         lon, lat = self._degrees.transform(x, y)
         return np.asarray(lat, float), np.asarray(lon, float)
 
-    def window(self, frame: Frame, box: Box, *, spare_m: float = 0.0, most_cells: int | None = None) -> Window:
+    def window(
+        self, frame: Frame, box: Box, *, spare_m: float = 0.0, most_cells: int | None = None, whole: bool = False
+    ) -> Window:
         """The nodes that cover ``box`` (west, south, east, north, plane metres) and ``spare_m`` around it.
 
-        The window is clipped to the tiles; gaps between them are NaN, and where two tiles hold the same node with two
-        heights both are kept (`Window.low_m`). Raises InputError if no tile meets the box, beyond ``most_cells``
-        (`MAX_CELLS`), and if the plane cannot be fitted to `FIT_ERROR_M`.
+        The window is clipped to the tiles, unless it is the ``whole`` of the box; gaps between them are NaN, and where
+        two tiles hold the same node with two heights both are kept (`Window.low_m`). Raises NotCovered if no tile meets
+        the box, InputError beyond ``most_cells`` (`MAX_CELLS`), and if the plane cannot be fitted to `FIT_ERROR_M`.
         """
         middle = (0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3]))
         there, accuracy_m = plane_to_raster(frame, self.crs.horizontal, box, where=self.where)
@@ -197,12 +188,13 @@ class Mosaic:
         col, row = exact(*box_lattice(wide))
         first_col, last_col = min(p.col for p in tiles), max(p.col + p.cols for p in tiles)
         first_row, last_row = min(p.row for p in tiles), max(p.row + p.raster.rows for p in tiles)
-        c0, c1 = max(math.floor(col.min()) - _SPARE_CELLS, first_col), math.ceil(col.max()) + _SPARE_CELLS + 1
-        r0, r1 = max(math.floor(row.min()) - _SPARE_CELLS, first_row), math.ceil(row.max()) + _SPARE_CELLS + 1
-        c1, r1 = min(c1, last_col), min(r1, last_row)
+        c0, c1 = math.floor(col.min()) - _SPARE_CELLS, math.ceil(col.max()) + _SPARE_CELLS + 1
+        r0, r1 = math.floor(row.min()) - _SPARE_CELLS, math.ceil(row.max()) + _SPARE_CELLS + 1
+        if not whole:
+            c0, r0, c1, r1 = max(c0, first_col), max(r0, first_row), min(c1, last_col), min(r1, last_row)
         parts = [(p, o) for p in tiles if c1 - c0 > 1 and r1 - r0 > 1 and (o := p.overlap(c0, r0, c1 - c0, r1 - r0))]
         if not parts or max(o[2] for _, o in parts) < 2 or max(o[3] for _, o in parts) < 2:
-            raise InputError(
+            raise NotCovered(
                 f"the DEM ({', '.join(r.name for r in self.rasters[:4])}{', …' if len(self.rasters) > 4 else ''}) does "
                 f"not cover the mission, which lies around {frame.to_degrees(*middle)[0]:.4f}, {reference:.4f}; give "
                 "the tiles of this place",
@@ -291,7 +283,37 @@ class Mosaic:
         return _Layout(x0, y0, dx, first.dy, tuple(tiles))
 
 
-def _require_known_units(rasters: Sequence[Raster], where: str) -> None:
+def layers_of(rasters: Sequence[Raster]) -> list[list[Raster]]:
+    """The rasters in groups, each with one coordinate system, one vertical datum and one grid."""
+    layers: list[list[Raster]] = []
+    for raster in rasters:
+        mine = next((layer for layer in layers if _on_one_grid(raster, layer[0])), None)
+        if mine is None:
+            layers.append([raster])
+        else:
+            mine.append(raster)
+    return layers
+
+
+def _on_one_grid(raster: Raster, first: Raster) -> bool:
+    if raster.crs.horizontal != first.crs.horizontal or raster.vertical != first.vertical:
+        return False
+    span = max(first.cols, first.rows, raster.cols, raster.rows)
+    ratio = _ratio(raster, first)
+    if max(abs(raster.dx / first.dx / ratio - 1.0), abs(raster.dy / first.dy - 1.0)) * span > ALIGNED_CELLS:
+        return False
+    dx = first.dx / ratio.denominator
+    west = raster.west - first.west + 0.5 * (raster.dx - first.dx)
+    north = first.north - raster.north + 0.5 * (raster.dy - first.dy)
+    return all(abs(x - round(x)) <= ALIGNED_CELLS for x in (_turned(west, first) / dx, north / first.dy))
+
+
+def _turned(west: float, first: Raster) -> float:
+    """A distance of longitudes less the whole turns in it."""
+    return west - 360.0 * round(west / 360.0) if first.crs.geographic else west
+
+
+def require_known_units(rasters: Sequence[Raster], where: str) -> None:
     """Raise InputError if a tile's heights are in another unit than metres, and another's in one that nobody states."""
     silent = next((r for r in rasters if r.unit.by == BY_NOBODY), None)
     other = next((r for r in rasters if not r.unit.is_same(METRE)), None)
@@ -303,10 +325,6 @@ def _require_known_units(rasters: Sequence[Raster], where: str) -> None:
             "(gdal_edit.py -units metre)",
             where=where,
         )
-
-
-def _datum(raster: Raster) -> str:
-    return raster.vertical.name if raster.vertical is not None else "nothing"
 
 
 def box_lattice(box: Box) -> tuple[Floats, Floats]:

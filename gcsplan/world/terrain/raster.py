@@ -1,15 +1,17 @@
 """One raster file: its header, and windows of it in metres with NaN for everything unknown.
 
-GDAL opens only three formats, and only files that exist: a path from a mission file must never become a web request.
+GDAL opens a file as the one format that its first bytes, or its name, tell, and only files that exist: a path from a
+mission file must never become a web request. A .vrt is read if it only puts GeoTIFFs together.
 Heights belong to pixel centres, whatever AREA_OR_POINT states: GDAL's transform refers to the corners in either case.
 """
 
 from __future__ import annotations
 
+import gzip
 import math
 import os
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -117,7 +119,7 @@ def open_raster(
     datum_unit: HeightUnit | None = None,
     nodata: float | None = None,
 ) -> Raster:
-    """Header of the raster at ``path`` (GeoTIFF, SRTM .hgt or .hgt.zip, ESRI .asc).
+    """Header of the raster at ``path`` (GeoTIFF, .vrt of GeoTIFFs, SRTM .hgt, DTED, .img, netCDF, .xyz, ESRI .asc).
 
     The keywords are the user's statements (`RasterStatements`).
 
@@ -179,14 +181,28 @@ def gdal(path: Path, other: str = "") -> Iterator[Any]:
         warnings.catch_warnings(),
         # GDAL gives the vertical part of older GeoTIFFs only on request.
         rasterio.Env(
-            GTIFF_POINT_GEO_IGNORE=False, GDAL_PAM_ENABLED=True, GDAL_CACHEMAX=CACHE_BYTES, GTIFF_REPORT_COMPD_CS=True
+            GTIFF_POINT_GEO_IGNORE=False,
+            GDAL_PAM_ENABLED=True,
+            GDAL_CACHEMAX=CACHE_BYTES,
+            GTIFF_REPORT_COMPD_CS=True,
+            CPL_VSIL_GZIP_WRITE_PROPERTIES="NO",
         ),
     ):
         # Our own check of the georeference reports more; the other warnings are between rasterio and its dependencies.
         for category in (NotGeoreferencedWarning, DeprecationWarning, PendingDeprecationWarning):
             warnings.simplefilter("ignore", category)
-        with rasterio.open(path.resolve(), driver=_driver(path, other)) as dataset:
+        with rasterio.open(_opened(path), driver=_driver(path, other)) as dataset:
             yield dataset
+
+
+def _opened(path: Path) -> str:
+    """The name by which GDAL opens a file; a packed tile is unpacked once before, for its size may be a lie."""
+    if path.suffix.lower() != ".gz":
+        return str(path.resolve())
+    with gzip.open(path) as packed:
+        if len(packed.read(MOST_OF_HGT + 1)) > MOST_OF_HGT:
+            raise InputError(f"{path} unpacks to more than a tile of 3601 posts a side has")
+    return f"/vsigzip/{path.resolve()}"
 
 
 @contextmanager
@@ -204,35 +220,87 @@ def _quiet_proj() -> Iterator[None]:
             os.environ.pop("PROJ_DEBUG", None)
 
 
-def _driver(path: Path, other: str) -> str:
-    """GDAL's name of the format, by the file's first bytes; never a format that may follow links to other files."""
+TIFF_MAGIC = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
+_BY_MAGIC = {
+    **dict.fromkeys(TIFF_MAGIC, "GTiff"), b"UHL1": "DTED", b"EHFA": "HFA", b"CDF\1": "netCDF", b"CDF\2": "netCDF",
+    b"CDF\5": "netCDF", b"\x89HDF": "netCDF",
+}  # fmt: skip
+
+
+def magic_of(path: Path) -> bytes:
+    """The first four bytes of a file."""
     with path.open("rb") as file:
-        magic = file.read(4)
-    if magic in (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"):
-        return "GTiff"
+        return file.read(4)
+
+
+def _driver(path: Path, other: str) -> str:
+    """GDAL's name of the format, by the file's first bytes, else by its name."""
+    found = _BY_MAGIC.get(magic_of(path))
+    if found is not None and (found == "GTiff" or not other):
+        return found
     if other:
         return other
-    return "SRTMHGT" if _is_hgt(path) else "AAIGrid"
+    if path.suffix.lower() == ".vrt":
+        _require_plain(path)
+        return "VRT"
+    return "SRTMHGT" if _is_hgt(path) else "XYZ" if path.suffix.lower() == ".xyz" else "AAIGrid"
+
+
+PLAIN_VRT = frozenset({
+    "VRTDataset", "SRS", "GeoTransform", "Metadata", "MDI", "VRTRasterBand", "ColorInterp", "Description",
+    "NoDataValue", "UnitType", "Offset", "Scale", "HideNoDataValue", "SimpleSource", "ComplexSource", "SourceFilename",
+    "SourceBand", "SourceProperties", "SrcRect", "DstRect", "NODATA", "BlockXSize", "BlockYSize", "Histograms",
+    "HistItem", "HistMin", "HistMax", "BucketCount", "IncludeOutOfRange", "Approximate", "HistCounts",
+})  # fmt: skip
+"""Elements of a .vrt that puts rasters together, as gdalbuildvrt writes them."""
+
+MOST_OF_VRT, MOST_OF_HGT = 8 * 2**20, 2 * 3601**2
+"""Bytes of a .vrt, and of an unpacked .hgt."""
+
+
+def _require_plain(path: Path) -> None:
+    """Raise InputError unless a .vrt only puts GeoTIFFs together that lie on this machine."""
+    import defusedxml.ElementTree
+
+    advice = "`rio convert FILE.vrt a.tif`, which is installed with gcsplan, makes a GeoTIFF of one that you trust"
+    with path.open("rb") as file:
+        text = file.read(MOST_OF_VRT + 1)
+    if len(text) > MOST_OF_VRT:
+        raise InputError(f"{path} has more than {MOST_OF_VRT >> 20} MB: {advice}")
+    root = defusedxml.ElementTree.fromstring(text, forbid_dtd=True)
+    for element in root.iter():
+        if element.tag not in PLAIN_VRT or "subClass" in element.attrib:
+            what = element.attrib.get("subClass", element.tag)
+            raise InputError(f"{path} does more than putting rasters together ({str(what)[:40]}): {advice}")
+        if element.tag == "SourceFilename":
+            name = element.text or ""
+            source = path.resolve().parent / name if element.attrib.get("relativeToVRT") == "1" else Path(name)
+            tell_file(source)
+            if not source.is_file():
+                raise InputError(f"{path} names a raster that is not there: {name[:200]}")
+            if magic_of(source) not in TIFF_MAGIC:
+                raise InputError(f"{path} names {name[:200]}, which is no GeoTIFF: {advice}")
 
 
 def _is_hgt(path: Path) -> bool:
     """Whether a file of this name is an SRTM tile, zipped or not: GDAL then reads the one tile of that name inside."""
-    return path.name.lower().endswith((".hgt", ".hgt.zip"))
+    return path.name.lower().endswith((".hgt", ".hgt.zip", ".hgt.gz"))
 
 
 def _unreadable(path: Path, why: Exception) -> str:
     hint = ""
     if _is_hgt(path):
         hint = (
-            "; an .hgt tile is named after its south-west corner (N36W085.hgt, or N36W085.hgt.zip with that inside) "
-            "and holds 1201 or 3601 posts a side"
+            "; an .hgt tile is named after its south-west corner (N36W085.hgt, or N36W085.hgt.zip or .hgt.gz with that "
+            "inside) and holds 1201 or 3601 posts a side"
         )
     elif path.suffix.lower() == ".zip":
         hint = "; unpack it first"
     cause = why.__cause__ or why  # rasterio's own words are "see previous exception"
     reason = (str(cause).strip() or type(cause).__name__).splitlines()[0].replace(str(path.absolute()), path.name)[:200]
     return (
-        f"{path} cannot be read as a GeoTIFF, an SRTM .hgt or an ESRI .asc grid ({reason}){hint}; "
+        f"{path} cannot be read as a GeoTIFF, .vrt, SRTM .hgt, DTED, .img, netCDF, .xyz or ESRI .asc grid "
+        f"({reason}){hint}; "
         "`rio convert FILE a.tif`, which is installed with gcsplan, makes a GeoTIFF of other formats"
     )
 
@@ -303,10 +371,16 @@ def _header(dataset: Any, path: Path, given: RasterStatements, *, where: str) ->
     to_metres = (scale * factor, offset * factor)
     header = Raster(
         path.name, system, t.c, t.f, t.a, -t.e, dataset.width, dataset.height, system.vertical,
-        _reader(path, *to_metres, given.nodata, where=where), path.stat().st_size, lambda: sha256_of_all(files),
+        _reader(path, *to_metres, given.nodata, where=where), _stored_bytes(files), lambda: sha256_of_all(files),
         tuple(notes), unit, files,
     )  # fmt: skip
     return header, to_metres
+
+
+def _stored_bytes(files: Sequence[Path]) -> int:
+    """Bytes that hold the heights: the file's own, or those of the files that a .vrt puts together."""
+    parts = files[1:] if files[0].suffix.lower() == ".vrt" else files[:1]
+    return sum(part.stat().st_size for part in parts)
 
 
 def _reader(path: Path, scale: float, offset: float, nodata: float | None, *, where: str) -> Reader:

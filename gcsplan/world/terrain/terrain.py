@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Literal, Protocol
@@ -26,8 +26,18 @@ from gcsplan.world.geodesy.height_unit import METRE
 from gcsplan.world.geometry.surface import Surface
 from gcsplan.world.geometry.zones import Box
 from gcsplan.world.terrain.geoid import GeoidGrid
+from gcsplan.world.terrain.mixture import TerrainLayer, cell_m, finest_first, mixed
 from gcsplan.world.terrain.model_words import heights_read
-from gcsplan.world.terrain.mosaic import Mosaic, Tile, Window, hash_of, tiles_of
+from gcsplan.world.terrain.mosaic import (
+    Mosaic,
+    NotCovered,
+    Tile,
+    Window,
+    hash_of,
+    layers_of,
+    require_known_units,
+    tiles_of,
+)
 from gcsplan.world.terrain.obstacles import canopy_on
 from gcsplan.world.terrain.peaks import Peak, flat_grid, peaks_grid
 from gcsplan.world.terrain.raster import MAX_CELLS, Raster, open_raster, require_file
@@ -43,8 +53,14 @@ RASTER_SPARE_M = 3000.0
 WIDER_M, WIDER_CELLS = (4000.0, 8000.0, 16_000.0, 32_000.0, 64_000.0, 120_000.0), 30_000_000
 """How far around the box, m, and over how many cells zeros are followed that fill the window to its border."""
 
-STANDING, CANOPY = 2, 4
-"""Arrays of a window that are held at once where obstacles of one height stand, and with a canopy."""
+STANDING, CANOPY, MIXED = 2, 4, 4
+"""Arrays of a window that are held at once where obstacles of one height stand, with a canopy, or of several layers."""
+
+MOST_LAYERS = 20
+"""Most grids of one terrain: each is looked at all over the finest one."""
+
+FILES_NAMED = 4
+"""Files of a layer that a note names."""
 
 GEOID_STEP_M = 100.0
 """Spacing at which the geoid is looked up, linear between, m: it bends by less than a millimetre over that."""
@@ -60,7 +76,7 @@ class TerrainSpec:
     exact zeros are ground or sea.
     ``obstacle_height_m`` stands everywhere; ``canopy`` is a raster of heights above ground, whose nodata cells are
     unknown unless ``canopy_nodata_m`` sets their height; if both are set the higher one counts. ``sea``: where a
-    published source has no tile there is sea.
+    published source has no tile, or no tile of the user's own knows the ground, there is sea.
     """
 
     dem: tuple[str, ...] = ()
@@ -145,7 +161,16 @@ def open_terrain(spec: TerrainSpec, *, where: str) -> Terrain:
     if not spec.dem:
         return _LocalTerrain(spec, where)
     at = place(where, "dem")
-    return terrain_of(Mosaic(_rasters(spec, at), where=at), spec, where=where)
+    rasters = _rasters(spec, at)
+    require_known_units(rasters, at)
+    layers = layers_of(rasters)
+    if len(layers) > MOST_LAYERS:
+        raise InputError(
+            f"the files lie on {len(layers)} grids, more than {MOST_LAYERS}: bring them together (gdalwarp -tr, or "
+            "gdal_merge.py)",
+            where=at,
+        )
+    return _RasterTerrain([Mosaic(layer, where=at) for layer in layers], spec, where, {}, ())
 
 
 def terrain_of(
@@ -160,7 +185,7 @@ def terrain_of(
 
     Raises InputError.
     """
-    return _RasterTerrain(tiles, spec, where, info or {}, notes)
+    return _RasterTerrain([tiles], spec, where, info or {}, notes)
 
 
 def place(where: str, key: str) -> str:
@@ -168,10 +193,54 @@ def place(where: str, key: str) -> str:
     return where if where.startswith("-") else f"{where}.{key}" if where else key
 
 
+class _TileSource:
+    """Tiles on one grid, the datum of their heights, and the geoid with which these become heights above the sea."""
+
+    def __init__(self, tiles: Tiles, spec: TerrainSpec, datum: VerticalDatum, where: str) -> None:
+        self.tiles, self.datum, self._spec, self._where = tiles, datum, spec, where
+        self.geoid = _geoid(spec, datum, where)
+
+    def window(self, frame: Frame, box: Box, *, spare_m: float, most_cells: int, whole: bool = False) -> Window:
+        """The window with heights above the sea, without undeclared voids; see `Mosaic.window`."""
+        mosaic = self.tiles
+        if whole and isinstance(mosaic, Mosaic):
+            window = mosaic.window(frame, box, spare_m=spare_m, most_cells=most_cells, whole=True)
+        else:
+            window = mosaic.window(frame, box, spare_m=spare_m, most_cells=most_cells)
+        notes = [n for r in mosaic.rasters for n in r.notes] + list(window.notes)
+        if self._spec.nodata is None:
+            wider = self._wider(frame, box) if any(window.goes_on) else ()
+            degrees = partial(mosaic.node_degrees, window)
+            notes += take_out_zeros(window, degrees, wider, where=place(self._where, "dem"))
+        if self.datum.note:
+            notes.append(self.datum.note)
+        if self.geoid is not None:
+            _take_off_geoid(window, self.geoid, mosaic)
+        return replace(window, notes=tuple(notes))
+
+    @property
+    def datum_words(self) -> str:
+        """The datum for the outputs."""
+        return self.datum.name if self.geoid is None else f"{self.datum.name}, made AMSL with {self.geoid.path.name}"
+
+    def _wider(self, frame: Frame, box: Box) -> Iterator[Window]:
+        """Windows around ``box`` that grow until the tiles end, or what may be read for them."""
+        west, south, east, north = box
+        for more_m in WIDER_M:
+            larger = west - more_m, south - more_m, east + more_m, north + more_m
+            try:
+                window = self.tiles.window(frame, larger, most_cells=WIDER_CELLS)
+            except InputError:
+                return
+            yield window
+            if not any(window.goes_on):
+                return
+
+
 class _RasterTerrain:
     def __init__(
         self,
-        tiles: Tiles,
+        tiles: Sequence[Tiles],
         spec: TerrainSpec,
         where: str,
         info: Mapping[str, object],
@@ -179,11 +248,9 @@ class _RasterTerrain:
     ) -> None:
         self._spec, self._where = spec, where
         self._info, self._notes = info, notes
-        self._mosaic = tiles
-        self._datum = vertical_datum(
-            spec.vertical_datum, tiles.rasters[0].vertical, where=place(where, "vertical_datum")
-        )
-        self._geoid = _geoid(spec, self._datum, where)
+        self._sources = [
+            _TileSource(t, spec, datum, where) for t, datum in zip(tiles, _datums(tiles, spec, where), strict=True)
+        ]
         self._canopy: Mosaic | None = None
         if spec.canopy is not None:
             # The canopy's heights are above ground: its vertical datum, if it names one, means nothing.
@@ -191,7 +258,10 @@ class _RasterTerrain:
             self._canopy = Mosaic([raster], where=place(where, "canopy"))
 
     def covers(self, lat_deg: ArrayLike, lon_deg: ArrayLike) -> Bools:
-        return self._mosaic.covers(lat_deg, lon_deg)
+        on = np.full(np.broadcast(lat_deg, lon_deg).shape, self._spec.sea)
+        for source in self._sources:
+            on |= source.tiles.covers(lat_deg, lon_deg)
+        return on
 
     def around(self, frame: Frame, box: Box) -> Terrain:
         return self
@@ -202,36 +272,32 @@ class _RasterTerrain:
 
     @property
     def geoid(self) -> GeoidGrid | None:
-        return self._geoid
+        return next((source.geoid for source in self._sources if source.geoid is not None), None)
 
     def extent(self, frame: Frame, box: Box) -> Box:
-        return self._mosaic.extent(frame, box)
+        boxes = np.array([source.tiles.extent(frame, box) for source in self._sources])
+        low, high = boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)
+        return float(low[0]), float(low[1]), float(high[0]), float(high[1])
 
     def load(self, frame: Frame, box: Box, *, most_cells: int | None = None) -> Surface:
-        spec, rasters = self._spec, self._mosaic.rasters
+        spec = self._spec
         held = CANOPY if self._canopy is not None else STANDING if spec.obstacle_height_m > 0.0 else 1
+        held = max(held, MIXED) if self._mixes else held
         most_cells = min(MAX_CELLS // held, MAX_CELLS if most_cells is None else most_cells)
-        window = self._mosaic.window(frame, box, spare_m=RASTER_SPARE_M, most_cells=most_cells)
+        window, used = self._window(frame, box, most_cells)
+        rasters = [raster for source in used for raster in source.tiles.rasters]
         read_hash = hash_of(rasters, window)
-        notes = [n for r in rasters for n in r.notes] + list(window.notes)
-        if spec.nodata is None:
-            wider = self._wider(frame, box) if any(window.goes_on) else ()
-            degrees = partial(self._mosaic.node_degrees, window)
-            notes += take_out_zeros(window, degrees, wider, where=place(self._where, "dem"))
+        notes = list(window.notes)
         high = window.heights_m
         if np.isnan(high).all():
             raise InputError(
                 "the DEM holds nothing but voids around the mission; give one with data here",
                 where=place(self._where, "dem"),
             )
-        datum = self._datum.name
-        if self._datum.note:
-            notes.append(self._datum.note)
+        datum = " and ".join(dict.fromkeys(source.datum_words for source in used))
         info: dict[str, object] = {}
-        if self._geoid is not None:
-            _take_off_geoid(window, self._geoid, self._mosaic)
-            datum = f"{datum}, made AMSL with {self._geoid.path.name}"
-            info["geoid_sha256"] = self._geoid.sha256()
+        if self.geoid is not None:
+            info["geoid_sha256"] = self.geoid.sha256()
         ground = high if window.low_m is None else window.low_m
         rows, cols = ground.shape
         size = window.grid.metres_per_cell(*(0.5 * np.add(window.plane_box[:2], window.plane_box[2:])))
@@ -262,18 +328,64 @@ class _RasterTerrain:
         info |= {**self._info, "notes": (*notes, *self._notes)}
         return Surface(ground, top, window.grid, info, window.goes_on, high)
 
-    def _wider(self, frame: Frame, box: Box) -> Iterator[Window]:
-        """Windows around ``box`` that grow until the tiles end, or what may be read for them."""
-        west, south, east, north = box
-        for more_m in WIDER_M:
-            larger = west - more_m, south - more_m, east + more_m, north + more_m
+    @property
+    def _mixes(self) -> bool:
+        return len(self._sources) > 1 or self._spec.sea
+
+    def _window(self, frame: Frame, box: Box, most_cells: int) -> tuple[Window, list[_TileSource]]:
+        """The window with the ground of all sources, and those that are in it. Raises InputError if none is."""
+        if not self._mixes:
+            only = self._sources[0]
+            return only.window(frame, box, spare_m=RASTER_SPARE_M, most_cells=most_cells), self._sources
+        wide = box[0] - RASTER_SPARE_M, box[1] - RASTER_SPARE_M, box[2] + RASTER_SPARE_M, box[3] + RASTER_SPARE_M
+        beside: NotCovered | None = None
+        found: list[tuple[TerrainLayer, _TileSource]] = []
+        for source in self._sources:
             try:
-                window = self._mosaic.window(frame, larger, most_cells=WIDER_CELLS)
-            except InputError:
-                return
-            yield window
-            if not any(window.goes_on):
-                return
+                window = source.window(frame, wide, spare_m=0.0, most_cells=most_cells)
+            except NotCovered as why:
+                beside = beside or why
+                continue
+            name = ", ".join(r.name for r in source.tiles.rasters[:FILES_NAMED])
+            found.append((TerrainLayer(window, cell_m(window), name), source))
+        if not found:
+            assert beside is not None
+            raise beside
+        used = {id(layer): source for layer, source in found}
+        order = finest_first([layer for layer, _ in found])
+        finest = used[id(order[0])]
+        held = wide if self._spec.sea else _within(wide, [layer.window.plane_box for layer, _ in found])
+        whole = finest.window(frame, held, spare_m=0.0, most_cells=most_cells, whole=True)
+        # Every other layer must reach as far as the finest one's grid does.
+        around = [
+            used[id(layer)].window(frame, whole.plane_box, spare_m=0.0, most_cells=most_cells) for layer in order[1:]
+        ]
+        layers = [replace(order[0], window=whole)]
+        layers += [replace(layer, window=window) for layer, window in zip(order[1:], around, strict=True)]
+        window = mixed(layers, sea=self._spec.sea)
+        if self._spec.sea:
+            degrees = partial(finest.tiles.node_degrees, window)
+            window = replace(window, notes=(*window.notes, *take_out_zeros(window, degrees, where=self._where)))
+        if beside is not None:  # a source that ends before this window may go on elsewhere
+            window = replace(window, goes_on=(True, True, True, True))
+        return window, [used[id(layer)] for layer in order]
+
+
+def _within(box: Box, parts: Sequence[Box]) -> Box:
+    """The part of a box that the box around ``parts`` holds, too."""
+    low, high = np.min(parts, axis=0), np.max(parts, axis=0)
+    west, south = max(box[0], float(low[0])), max(box[1], float(low[1]))
+    return west, south, min(box[2], float(high[2])), min(box[3], float(high[3]))
+
+
+def _datums(tiles: Sequence[Tiles], spec: TerrainSpec, where: str) -> list[VerticalDatum]:
+    """The datum of each source. The user's statement counts for all, or for sources that state none beside others."""
+    at, stated = place(where, "vertical_datum"), [t.rasters[0].vertical for t in tiles]
+    silent = None in stated
+    return [
+        vertical_datum(None if silent and own is not None and len(tiles) > 1 else spec.vertical_datum, own, where=at)
+        for own in stated
+    ]
 
 
 class _LocalTerrain:

@@ -140,15 +140,42 @@ def terminal(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 def test_on_a_terminal_what_is_missing_is_asked_for(run: Any, tmp_path: Path, terminal: list[str]) -> None:
     terminal += ["nowhere", "36.6175, -84.3892", "36.6133 N 84.3 W", "flat", "flat high", "flat 310", "px5", "px4"]
+    terminal += ["high", "120"]
     code, _, err = run("new")
     assert code == 0
     assert terminal == []
     assert "'nowhere' is no place" in err
     assert "flat ground needs its height" in err
     assert "--autopilot px5" in err
+    assert "give metres above ground, or nothing" in err
     (request,) = gcsplan.load_mission(tmp_path / "mission.yaml").vehicles
+    assert request.vehicle.limits.max_agl_m == 120.0
     assert request.vehicle.autopilot is Autopilot.PX4
     assert request.start == pytest.approx((request.start[0], request.start[1], 310.0))
+
+
+def test_several_vehicles_zones_a_battery_and_a_ceiling_stand_in_the_file(run: Any, tmp_path: Path) -> None:
+    zone = {"type": "Polygon", "coordinates": [[[-84.35, 36.65], [-84.34, 36.65], [-84.34, 36.66], [-84.35, 36.65]]]}
+    feature = {"type": "Feature", "properties": {"name": "wood"}, "geometry": zone}
+    (tmp_path / "zones.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": [feature]}))
+    more = ("--zones", "zones.geojson", "--battery-wh", "250", "--max-agl", "120", "--sysid", "4")
+    two = (*PLACES, "--start", "36.62,-84.39", "--goal", "36.615,-84.30")
+    code, _, err = run("new", *two, *SAMPLE, *more)
+    assert code == 0, err
+    mission = gcsplan.load_mission(tmp_path / "mission.yaml")
+    assert [(r.vehicle.name, r.vehicle.sysid) for r in mission.vehicles] == [("uav4", 4), ("uav5", 5)]
+    assert [r.start_deg for r in mission.vehicles] == [(36.6175, -84.3892), (36.62, -84.39)]
+    assert all(r.vehicle.energy.battery_j == 250.0 * 3600.0 for r in mission.vehicles)
+    assert all(r.vehicle.limits.max_agl_m == 120.0 for r in mission.vehicles)
+    assert [z.name for z in mission.zones] == ["wood"]
+    for bad, words in (
+        ((*PLACES, *START), "2 --start, 1 --goal"),
+        ((*PLACES, "--max-agl", "20"), "max_agl_m"),
+        ((*PLACES, "--zones", "none.kml"), "--zones"),
+    ):
+        code, _, err = run("new", *bad, *SAMPLE, "--force")
+        assert code == 2
+        assert words in err
 
 
 def test_questions_end(run: Any, tmp_path: Path, terminal: list[str]) -> None:

@@ -296,7 +296,7 @@ def test_fences_go_before_missions_and_an_absent_vehicle_stops_nobody_else(
     ]
     with SimServer(boards, "udpin:127.0.0.1:0", speedup=10.0) as server:
         plain = [job_of(f"uav{n}", n, server.url_for_gcs, mission, craft, where) for n in (1, 2)]
-        jobs, notes = fencing.with_fences(plain)
+        jobs, notes = fencing.with_lists(plain, fencing.ListsSent(fence=True))
         assert notes == []
         first, second = uploads.run_jobs(jobs, uploads.UploadOptions())
     assert first.verified
@@ -313,7 +313,8 @@ def test_fences_go_before_missions_and_an_absent_vehicle_stops_nobody_else(
 def test_vehicles_without_zones_keep_their_fence(monkeypatch: pytest.MonkeyPatch) -> None:
     be_impatient(monkeypatch)
     where, craft = world(), vehicle()
-    jobs, notes = fencing.with_fences([job_of("uav1", 1, uploads.SIM, mission_in(where, craft), craft, where)])
+    job = job_of("uav1", 1, uploads.SIM, mission_in(where, craft), craft, where)
+    jobs, notes = fencing.with_lists([job], fencing.ListsSent(fence=True))
     assert "left as it is" in str(notes[0][1])
     (done,) = uploads.run_jobs(jobs, uploads.UploadOptions(), simulator=loopback_fleet)
     assert done.verified
@@ -322,7 +323,8 @@ def test_vehicles_without_zones_keep_their_fence(monkeypatch: pytest.MonkeyPatch
 
 def test_a_simulated_upload_sends_the_fence_too() -> None:
     where, craft = world(zones=MIXED), vehicle()
-    jobs, _ = fencing.with_fences([job_of("uav1", 1, uploads.SIM, mission_in(where, craft), craft, where)])
+    job = job_of("uav1", 1, uploads.SIM, mission_in(where, craft), craft, where)
+    jobs, _ = fencing.with_lists([job], fencing.ListsSent(fence=True))
     (done,) = uploads.run_jobs(jobs, uploads.UploadOptions(), simulator=loopback_fleet)
     assert done.verified
     assert done.as_dict()["fence"]["items"] == 6
@@ -380,6 +382,8 @@ def test_plan_and_upload_send_the_fence_where_that_is_asked_for(run: Any) -> Non
         assert code == 4
         assert "shed" in err
         assert board.items(FENCE) == (circle,)
-        assert run("upload", "out/uav1.plan", *to, "--unchecked", "--fence")[0] == 2
+        # Without a world the file's own fence goes alone, and there must be one.
+        assert run("upload", "out/uav1.plan", *to, "--unchecked", "--fence")[0] == 0
+        assert run("upload", "out/uav1.waypoints", *to, "--unchecked", "--fence")[0] == 2
         assert run("clear", *to, "--type", "fence")[0] == 0
     assert board.items(FENCE) == ()

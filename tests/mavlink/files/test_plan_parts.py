@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 import pytest
@@ -18,7 +19,7 @@ from gcsplan.mavlink.files.plan_fence import (
     rally_json,
     unread_keys,
 )
-from gcsplan.mavlink.files.plan_file import landing_entries
+from gcsplan.mavlink.files.plan_file import landing_entries, parse_plan
 from gcsplan.mavlink.mission.mission import MissionItem
 from gcsplan.notes.note import Note
 from tests.support.effort import draws
@@ -149,3 +150,27 @@ def test_what_of_a_section_is_not_read_is_named() -> None:
     )
     assert unread_keys({"version": 9, "a": 1}, FENCE_KEYS, 2, "geoFence") == "geoFence of version 9 (a)"
     assert unread_keys([1], FENCE_KEYS, 2, "geoFence") == "geoFence is no object"
+
+
+@pytest.mark.parametrize(
+    ("plan", "words"),
+    [
+        ({"groundStation": "QGroundControl", "items": [], "version": "1.0"}, r"old QGroundControl .* save it again"),
+        ({"fileType": "GeoFence", "version": 1}, "one of 'GeoFence': give the file of the mission"),
+    ],
+)
+def test_another_json_file_of_a_ground_station_is_named_with_a_cure(plan: dict[str, Any], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        parse_plan(json.dumps(plan), autopilot=None, where="a.mission")
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"), [("survey", "save it again"), ("StructureScan", "read it back with `gcsplan download`")]
+)
+def test_a_complex_item_without_its_way_points_is_refused_with_a_cure(kind: str, words: str) -> None:
+    entry = {"type": "ComplexItem", "complexItemType": kind, "version": 3}
+    mission = {
+        "version": 2, "firmwareType": 12, "vehicleType": 2, "plannedHomePosition": [36.6, -84.4, 0], "items": [entry],
+    }  # fmt: skip
+    with pytest.raises(InputError, match=words):
+        parse_plan(json.dumps({"fileType": "Plan", "version": 1, "mission": mission}), autopilot=None, where="f")

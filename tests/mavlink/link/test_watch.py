@@ -8,6 +8,7 @@ from typing import Any
 import pymavlink.dialects.v20.ardupilotmega as dialect
 import pytest
 
+from gcsplan.mavlink.link.frames import FrameParser
 from gcsplan.mavlink.link.link import Heard
 from gcsplan.mavlink.link.options import TransferPatience
 from gcsplan.mavlink.link.session.parameters import decode_value, judge_fence_parameters, judge_parameters
@@ -87,6 +88,18 @@ def test_what_comes_late_counts_against_and_never_for() -> None:
     watch = Watch(1)
     watch.note(Heard(Address(1, 1), "a", beat().message, late=True), 0.0)
     assert watch.state(0.0) is None
+
+
+def test_the_last_frame_tells_whether_mavlink_2_comes_back() -> None:
+    us = dialect.MAVLink(None, 1, 1)
+    watch = Watch(1)
+    for now, old in ((0.0, True), (1.0, False), (2.0, True)):
+        frame = beat().message.pack(us, force_mavlink1=old)
+        (message,) = FrameParser().feed(frame)
+        watch.note(Heard(Address(1, 1), "a", message), now)
+        state = watch.state(now)
+        assert state is not None
+        assert state.mavlink1 is old
 
 
 def test_one_without_heartbeats_is_a_rival_all_the_same() -> None:

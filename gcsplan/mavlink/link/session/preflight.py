@@ -167,6 +167,10 @@ def _abilities(
     needed = {FENCE: (CAN_FENCE, "fence"), RALLY: (CAN_RALLY, "rally points")}.get(mission_type)
     if needed and state.can(needed[0]) is False:
         against.append(("unsupported", f"the vehicle says that it keeps no {needed[1]}"))
+    if needed and state.mavlink1:
+        against.append(("mavlink1", f"{Note('only_mavlink1')}: no {needed[1]} can be sent"))
+    elif state.mavlink1:
+        warnings.append(Note("only_mavlink1"))
     if state.capabilities is None:
         warnings.append(Note("capabilities_not_told"))
     elif not state.can(CAN_MISSION_INT) and not is_generic(state.mav_autopilot):

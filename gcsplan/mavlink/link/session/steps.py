@@ -6,7 +6,9 @@ protocol.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection, Iterable, Sequence
+from dataclasses import replace
 from typing import Protocol
 
 import pymavlink.dialects.v20.ardupilotmega as dialect
@@ -34,6 +36,9 @@ NO_PARAMETERS_S = 1.0
 SLOW_ANSWER_S = 6.0
 """Patience with parameters that are reported but decide nothing: several round trips of a slow link."""
 
+CAPABILITIES_S = 4.5
+"""Patience with a vehicle's first answer: two round trips of a slow link."""
+
 
 def discover_steps(
     channel: Channel, watch: Watch, *, timeout_s: float, listen_s: float, standby_s: float = 0.0
@@ -51,22 +56,30 @@ def discover_steps(
         yield started + timeout_s
         _note(channel, watch)
     found, requested, ask_at = clock(), 0, clock()
+    first_at = answered_at = math.inf
     while True:
         now = clock()
         state = watch.state(now) or state
+        if state.capabilities is not None and answered_at == math.inf:
+            answered_at = now
+            ask_at = now + ASK_AGAIN_S if requested else ask_at  # the other answers are on their way
         times = _MOST_REQUESTS_OF_GENERIC if is_generic(state.mav_autopilot) else _MOST_REQUESTS
         complete = state.capabilities is not None and state.located
         if _is_booting(state) and now < found + standby_s:
             yield now + ASK_AGAIN_S
         elif not complete and now >= ask_at and requested < times:
             _ask(channel, state)
+            first_at = min(first_at, now)
             requested, ask_at = requested + 1, now + ASK_AGAIN_S
+            if requested == times and state.capabilities is None and not is_generic(state.mav_autopilot):
+                ask_at = max(ask_at, first_at + CAPABILITIES_S)
         elif not complete and now < ask_at:
             yield ask_at
         elif now < found + listen_s:
             yield found + listen_s
         else:
-            return state
+            known = requested and answered_at < math.inf
+            return replace(state, round_trip_s=answered_at - first_at if known else 0.0)
         _note(channel, watch)
 
 
@@ -82,9 +95,10 @@ def parameter_steps(
 ) -> LinkSteps[OnBoard]:
     """Return the values of the parameters that the vehicle has, and the names that it says it does not have.
 
-    A value that is not a number is NaN. A vehicle has one name of each of ``groups``. The step takes at most 2 s after
-    the last answer, or 1 s if none arrives; but it requests the groups that are ``needed`` until ``most_s``, unless the
-    vehicle does not say what it is. A name without an answer is in neither result: `parameter_names.unanswered`.
+    A value that is not a number is NaN. A vehicle has one name of each of ``groups``. The step takes at most 2 s and a
+    round trip after the last answer, or 1 s and a round trip if none arrives; but it requests the groups that are
+    ``needed`` until ``most_s``, unless the vehicle does not say what it is. A name without an answer is in neither
+    result: `parameter_names.unanswered`.
     """
     clock = channel.link.clock
     generic = is_generic(state.mav_autopilot)
@@ -106,7 +120,7 @@ def parameter_steps(
         return missing(group for group in needed if not values.lacks(group))
 
     def until() -> float:
-        patience_s = PARAMETER_S if values or unknown else NO_PARAMETERS_S
+        patience_s = state.round_trip_s + (PARAMETER_S if values or unknown else NO_PARAMETERS_S)
         return max(answered_at + patience_s, started + most_s if waited_for() and not generic else started)
 
     for name in (name for group in groups if values.too_old_for(group) for name in group):

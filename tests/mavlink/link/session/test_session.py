@@ -29,7 +29,7 @@ from gcsplan.mavlink.link.session.session import (
 from gcsplan.mavlink.link.watch import BOOT, CRITICAL, POWEROFF, STANDBY, UNINIT, VehicleState, Watch
 from gcsplan.mavlink.mission.autopilots import altitude_of_cm, flies_straight
 from gcsplan.mavlink.mission.compare import compare, faults
-from gcsplan.mavlink.mission.mission import FENCE, Home, Mission, MissionItem
+from gcsplan.mavlink.mission.mission import FENCE, RALLY, Home, Mission, MissionItem
 from gcsplan.mavlink.protocol.messages import Address
 from gcsplan.mavlink.protocol.transfer import Timers, TransferProgress
 from gcsplan.notes.note import Note
@@ -340,6 +340,15 @@ def warnings_of(state: VehicleState, **more: Any) -> str:
 
 def test_a_vehicle_that_fits_draws_no_warning() -> None:
     assert warnings_of(READY) == ""
+
+
+def test_a_vehicle_that_answers_in_mavlink_1_is_told_so_and_gets_no_fence() -> None:
+    old = replace(READY, mavlink1=True)
+    assert "only MAVLink 1 comes back from the vehicle: set SERIALn_PROTOCOL 2" in warnings_of(old)
+    for kind, words in ((FENCE, "no fence can be sent"), (RALLY, "no rally points can be sent")):
+        with pytest.raises(VehicleRefused, match=words) as refused:
+            preflight(old, (), COPTER, mission_type=kind)
+        assert refused.value.reason == "mavlink1"
 
 
 def test_an_autopilot_without_a_position_is_refused_unless_that_is_ignored() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any, TypeVar, cast
 
 import pymavlink.dialects.v20.ardupilotmega as dialect
@@ -96,6 +97,50 @@ def test_how_often_a_position_is_asked_for(
     assert air.now - 100.25 == pytest.approx(lasts_s)
 
 
+def ended(steps: LinkSteps[T], air: Air, waiting: list[tuple[float, Any]]) -> T:
+    """The result of ``steps``, with answers that wait until their time has come."""
+    try:
+        until = next(steps)
+        for _ in range(2000):
+            air.now = max(air.now, min([until, *(at for at, _ in waiting)]))
+            for at, answer in [w for w in waiting if w[0] <= air.now]:
+                waiting.remove((at, answer))
+                air.say(answer)
+            until = next(steps)
+    except StopIteration as stop:
+        result: T = stop.value
+        return result
+    raise AssertionError("it goes on and on")
+
+
+@pytest.mark.parametrize("kinds", [(POSITION, CAPABILITIES), (CAPABILITIES,)])
+def test_capabilities_come_over_a_round_trip_of_two_seconds(kinds: tuple[int, ...]) -> None:
+    """The position comes with them; what never comes is not waited for any longer."""
+    waiting: list[tuple[float, Any]] = []
+    known = answering(*kinds)
+
+    def asked(message: Any) -> Sequence[Any]:
+        waiting.extend((air.now + 2.05, answer) for answer in known(message))
+        return []
+
+    air = Air(asked, ARDUPILOTMEGA)
+    steps = discover_steps(air.channel, Watch(1), timeout_s=5.0, listen_s=0.0)
+    next(steps)
+    air.say(dialect.MAVLink_heartbeat_message(2, ARDUPILOTMEGA, 0, 0, STANDBY, 3))
+    state = ended(steps, air, waiting)
+    assert state.capabilities == 57348
+    assert state.located is (POSITION in kinds)
+    assert state.round_trip_s == pytest.approx(2.05)
+    assert air.now - 100.0 <= 2.05 + 0.5 + 1e-6
+
+
+def test_parameters_that_decide_nothing_are_read_over_a_slow_link_too() -> None:
+    slow = replace(STATE, round_trip_s=2.05)
+    values, took_s = late(2.05, lambda name: [value(name, 7.0)], state=slow)
+    assert {"FENCE_ENABLE", "FENCE_TYPE"} <= set(values)
+    assert took_s == pytest.approx(2.05, abs=0.01)
+
+
 def test_rivals_are_listened_for_all_the_same() -> None:
     air = Air(answering(CAPABILITIES), GENERIC)
     air.run(discover_steps(air.channel, Watch(1), timeout_s=5.0, listen_s=1.5))
@@ -160,7 +205,9 @@ def test_what_another_component_says_of_parameters_does_not_count() -> None:
     assert [name_of(m) for m in air.sent].count("FENCE_ENABLE") == 2
 
 
-def late(after_s: float, answers: Callable[[str], Sequence[Any]], **more: Any) -> tuple[Any, float]:
+def late(
+    after_s: float, answers: Callable[[str], Sequence[Any]], state: VehicleState | None = None, **more: Any
+) -> tuple[Any, float]:
     """What is read over a link whose answers come so much later, and the seconds that it took."""
     waiting: list[tuple[float, Any]] = []
 
@@ -169,19 +216,8 @@ def late(after_s: float, answers: Callable[[str], Sequence[Any]], **more: Any) -
         return []
 
     air = Air(asked, ARDUPILOTMEGA)
-    steps = parameter_steps(air.channel, STATE, GROUPS, Watch(1), **more)
-    try:
-        until = next(steps)
-        for _ in range(2000):
-            due = min([until, *(at for at, _ in waiting)])
-            air.now = max(air.now, due)
-            for at, answer in [w for w in waiting if w[0] <= air.now]:
-                waiting.remove((at, answer))
-                air.say(answer)
-            until = next(steps)
-    except StopIteration as stop:
-        return stop.value, air.now - 100.0
-    raise AssertionError("it goes on and on")
+    steps = parameter_steps(air.channel, state or STATE, GROUPS, Watch(1), **more)
+    return ended(steps, air, waiting), air.now - 100.0
 
 
 def test_needed_parameters_are_read_over_a_slow_link() -> None:
