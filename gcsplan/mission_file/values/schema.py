@@ -162,7 +162,7 @@ class ZoneKeys(Keys):
     buffer_m: float | None = None
     """Half the width of a corridor around a line, at most 20 000; with `file` that of its lines that have none."""
     file: Text | None = None
-    """Zones: .geojson, .kml, .kmz, .gpkg, .shp, .fgb, .zip, .csv, a fence, OpenAir, ED-269, ED-318 or openAIP."""
+    """Zones: .geojson, .kml, .kmz, .gpkg, .shp, .fgb, .zip, .csv, .fen, .poly, OpenAir, ED-269, ED-318 or openAIP."""
     layer: Text | None = None
     """With `file`: the only layer of a .gpkg to be read; if absent, every one."""
     on_bad: Literal["refuse", "strict", "skip"] | None = None
