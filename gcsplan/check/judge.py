@@ -291,29 +291,35 @@ def _findings(
     worst: dict[tuple[int, str, int], Violation] = {}
     broken: dict[tuple[int, str, int], list[int]] = {}
     for v in report.violations:
-        key = (int(plane.owner[v.leg]), v.kind, v.zone)
+        # All parts of one outside are one limit: the worst counts.
+        outside = world.airspace.zones[v.zone].outside if v.zone >= 0 else None
+        key = (int(plane.owner[v.leg]), v.kind, v.zone if outside is None else -2)
         broken.setdefault(key, []).append(v.leg)
         if key not in worst or v.by > worst[key].by:
             worst[key] = v
     found = []
-    for (owner, kind, zone), v in sorted(worst.items(), key=lambda kv: kv[0][0]):
+    for (owner, kind, key_zone), v in sorted(worst.items(), key=lambda kv: kv[0][0]):
         s = stretches[owner]
-        v = enough(v, np.array(broken[owner, kind, zone]), plane.legs, limits, world.airspace)
+        v = enough(v, np.array(broken[owner, kind, key_zone]), plane.legs, limits, world.airspace)
         lat, lon = (float(x) for x in world.frame.to_degrees(v.east_m, v.north_m))
-        name = world.airspace.zones[zone].name if zone >= 0 else ""
-        note = _note_of(s, v, name, (lat, lon))
+        zone = world.airspace.zones[v.zone] if v.zone >= 0 else None
+        name = "" if zone is None else zone.name_at(v.east_m, v.north_m)
+        note = _note_of(s, v, name, (lat, lon), inside=zone is not None and zone.outside is not None)
         found.append(Finding(s.seq, kind, note, lat, lon, v.amsl_m, v.value, v.limit, v.by, v.unit, name))
     return found
 
 
-def _note_of(s: Stretch, v: Violation, zone: str, at: tuple[float, float]) -> Note:
-    """The note on a violation on a stretch; ``at``: latitude and longitude."""
+def _note_of(s: Stretch, v: Violation, zone: str, at: tuple[float, float], *, inside: bool) -> Note:
+    """The note on a violation on a stretch; ``at``: latitude and longitude; ``inside``: the zone is to stay in."""
     way = s.kind if s.jumped_from is None else Note("after_jump", way=s.kind, jump=s.jumped_from)
     lat, lon = at
     if v.kind == "coverage":
         return Note("over_unknown_ground", s.seq, way=way, lat=lat, lon=lon, amsl_m=v.amsl_m)
     if v.kind == "zone":
-        return Note("inside_zone", s.seq, way=way, zone=zone, by_m=v.by, lat=lat, lon=lon, amsl_m=v.amsl_m)
+        return Note(
+            "outside_keep_in" if inside else "inside_zone", s.seq, way=way, zone=zone, by_m=v.by, lat=lat, lon=lon,
+            amsl_m=v.amsl_m,
+        )  # fmt: skip
     if v.kind in BROKEN_ANGLES:
         return Note(
             BROKEN_ANGLES[v.kind], s.seq, way=way, value_deg=v.value, limit_deg=v.limit, by_deg=v.by, lat=lat, lon=lon,

@@ -196,7 +196,9 @@ def nearest_pass(
     near = np.flatnonzero(_meets_box(legs, air.zone_table.box_m))
     if not len(near):
         return None
-    free = replace(limits, horizontal_clearance_m=0.0, min_agl_m=0.0, max_agl_m=None, max_amsl_m=None)
+    free = replace(
+        limits, horizontal_clearance_m=0.0, vertical_clearance_m=0.0, min_agl_m=0.0, max_agl_m=None, max_amsl_m=None
+    )
     some = Legs(legs.start[near], legs.end[near], legs.column[near], np.zeros(len(near)), np.zeros(len(near)))
 
     def hit(error_m: float) -> Violation | None:

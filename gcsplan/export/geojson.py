@@ -1,7 +1,8 @@
-"""`mission.geojson` (RFC 7946): tracks, way points and no-fly zones, with the mission file's property names.
+"""`mission.geojson` (RFC 7946): tracks, way points, no-fly zones and keep-in areas, with the mission file's names.
 
-The zones can be read back as ``no_fly: [{file: mission.geojson}]``: they are the features with ``kind: no_fly``. Shapes
-that cross the antimeridian are cut there (section 3.1.9).
+The zones can be read back as ``no_fly: [{file: mission.geojson}]``: they are the features with ``kind: no_fly``, and
+those with ``kind: keep_in`` are read as areas to stay in. Shapes that cross the antimeridian are cut there (section
+3.1.9).
 """
 
 from __future__ import annotations
@@ -15,10 +16,10 @@ from typing import Any
 import numpy as np
 
 from gcsplan.arrays import Floats
-from gcsplan.export.rows import HEIGHT_DECIMALS, FlownTrack, WayPoint, outlines_deg
+from gcsplan.export.rows import HEIGHT_DECIMALS, FlownTrack, WayPoint, areas_deg, outlines_deg
 from gcsplan.figures import floored
 from gcsplan.world.geodesy.frame import Frame
-from gcsplan.world.geometry.zones import Level, Zone
+from gcsplan.world.geometry.zones import KeepIn, Level, Zone, keep_in_of, no_fly_of
 
 Position = list[float]
 
@@ -46,9 +47,13 @@ def write_geojson(name: str, tracks: Sequence[FlownTrack], zones: Sequence[Zone]
                 place = _position(track.lon_deg[index], track.lat_deg[index], track.amsl_m[index])
                 about = {"kind": "waypoint", "vehicle": track.vehicle, **_figures(point, float(track.amsl_m[index]))}
                 features.append(_feature({"type": "Point", "coordinates": place}, about))
-    for zone, ring in zip(zones, outlines_deg(zones, frame), strict=True):
+    no_fly = no_fly_of(zones)
+    for zone, ring in zip(no_fly, outlines_deg(no_fly, frame), strict=True):
         about = {"kind": "no_fly", "name": zone.name, **_levels(zone)}
         features.append(_feature(_area(ring), about))
+    for area, rings in areas_deg(keep_in_of(zones), frame):
+        about = {"kind": "keep_in", "name": area.name, **_levels(area)}
+        features.append(_feature(_area(rings[0]) if len(rings) == 1 else _with_holes(rings), about))
     document = {
         "type": "FeatureCollection",
         "name": name,
@@ -77,7 +82,14 @@ def _feature(geometry: dict[str, Any], properties: dict[str, Any]) -> dict[str, 
     return {"type": "Feature", "properties": properties, "geometry": geometry}
 
 
-def _levels(zone: Zone) -> dict[str, float]:
+def _with_holes(rings: Sequence[Floats]) -> dict[str, Any]:
+    """A polygon with holes; one that crosses the antimeridian goes past it."""
+    turned = [np.stack([_unwrapped(np.append(rings[0][:1, 1], ring[:, 1]))[1:], ring[:, 0]], axis=-1) for ring in rings]
+    closed = [np.vstack([ring, ring[:1]]) for ring in turned]
+    return {"type": "Polygon", "coordinates": [[_position(lon, lat) for lon, lat in ring.tolist()] for ring in closed]}
+
+
+def _levels(zone: Zone | KeepIn) -> dict[str, float]:
     def entry(side: str, level: Level | None) -> dict[str, float]:
         return {} if level is None else {f"{side}_{level.datum}_m": float(level.value_m)}
 

@@ -15,10 +15,10 @@ from xml.sax.saxutils import escape
 import numpy as np
 
 from gcsplan.arrays import Floats
-from gcsplan.export.rows import HEIGHT_DECIMALS, FlownTrack, WayPoint, extent_words, outlines_deg
+from gcsplan.export.rows import HEIGHT_DECIMALS, FlownTrack, WayPoint, areas_deg, extent_words, outlines_deg
 from gcsplan.figures import floored
 from gcsplan.world.geodesy.frame import Frame
-from gcsplan.world.geometry.zones import Level, Zone
+from gcsplan.world.geometry.zones import KeepIn, Level, Zone, keep_in_of, no_fly_of
 
 KML_COLOURS = ("ff0099ff", "ffff9900", "ff66cc00", "ffcc00cc", "ff00cccc", "ff3333ff")  # aabbggrr
 MOST_CURTAINS = 100
@@ -54,6 +54,8 @@ def write_kml(
     time of day from which the tracks' times count, if there is one.
     """
     top_m = max((float(t.amsl_m.max()) for t in tracks), default=0.0) + DRAWN_TOP_M
+    areas = areas_deg(keep_in_of(zones), frame)
+    zones = no_fly_of(zones)
     outlines = outlines_deg(zones, frame)
     lines = [
         '<?xml version="1.0" encoding="UTF-8"?>',
@@ -65,6 +67,8 @@ def write_kml(
         *(line for number, colour in enumerate(KML_COLOURS) for line in _styles(number, colour)),
         '<Style id="zone"><LineStyle><color>ff0000ff</color></LineStyle>'
         "<PolyStyle><color>600000ff</color></PolyStyle></Style>",
+        '<Style id="area"><LineStyle><color>ff00a000</color></LineStyle>'
+        "<PolyStyle><color>0000a000</color></PolyStyle></Style>",
     ]
     light = len(tracks) > MOST_CURTAINS
     for number, track in enumerate(tracks):
@@ -73,6 +77,11 @@ def write_kml(
         lines += ["<Folder>", "<name>no-fly zones</name>"]
         for zone, outline in zip(zones, outlines, strict=True):
             lines += _zone(zone, outline, top_m)
+        lines.append("</Folder>")
+    if areas:
+        lines += ["<Folder>", "<name>keep-in areas</name>"]
+        for area, rings in areas:
+            lines += _area(area, rings, top_m)
         lines.append("</Folder>")
     return "\n".join([*lines, "</Document>", "</kml>"]) + "\n"
 
@@ -215,18 +224,31 @@ def _zone(zone: Zone, ring: Floats, top_m: float) -> Iterable[str]:
     yield "</Placemark>"
 
 
+def _area(area: KeepIn, rings: Sequence[Floats], top_m: float) -> Iterable[str]:
+    """A part of a keep-in area, as an outline at its ceiling; ``kind`` says that it is no no-fly zone."""
+    yield (
+        f"<Placemark><name>{_text(area.name)}</name><description>keep in, {extent_words(area)}</description>"
+        f'<styleUrl>#area</styleUrl><ExtendedData><Data name="kind"><value>keep_in</value></Data>'
+        f"{_limit('lower', area.floor, 'GND')}{_limit('upper', area.ceiling, 'UNL')}</ExtendedData>"
+    )
+    yield _face(rings[0], area.ceiling or Level(top_m, "amsl"), solid=False, holes=rings[1:])
+    yield "</Placemark>"
+
+
 def _limit(key: str, level: Level | None, without: str) -> str:
     """The level in words that `mission_file` reads: a zone without end is drawn with one, and must not be read so."""
     words = without if level is None else f"{float(level.value_m)!r} m {level.datum.upper()}"
     return f'<Data name="{key}"><value>{words}</value></Data>'
 
 
-def _face(ring: Floats, level: Level, *, solid: bool) -> str:
-    closed = np.vstack([ring, ring[:1]])
-    heights = np.full(len(closed), level.value_m)
+def _face(ring: Floats, level: Level, *, solid: bool, holes: Sequence[Floats] = ()) -> str:
+    def boundary(kind: str, corners: Floats) -> str:
+        closed = np.vstack([corners, corners[:1]])
+        places = _coordinates(closed[:, 0], closed[:, 1], np.full(len(closed), level.value_m))
+        return f"<{kind}><LinearRing><coordinates>{places}</coordinates></LinearRing></{kind}>"
+
     mode = "absolute" if level.datum == "amsl" else "relativeToGround"
     return (
         f"<Polygon><extrude>{int(solid)}</extrude><altitudeMode>{mode}</altitudeMode>"
-        f"<outerBoundaryIs><LinearRing><coordinates>{_coordinates(closed[:, 0], closed[:, 1], heights)}</coordinates>"
-        "</LinearRing></outerBoundaryIs></Polygon>"
+        f"{boundary('outerBoundaryIs', ring)}{''.join(boundary('innerBoundaryIs', hole) for hole in holes)}</Polygon>"
     )

@@ -10,7 +10,7 @@ import numpy as np
 
 from gcsplan.arrays import Floats
 from gcsplan.world.geodesy.frame import Frame
-from gcsplan.world.geometry.zones import Circle, Level, Zone
+from gcsplan.world.geometry.zones import Circle, KeepIn, Level, Zone
 
 HEIGHT_DECIMALS = 2
 """Decimals of heights on a map, in metres."""
@@ -108,7 +108,16 @@ def outlines_deg(zones: Sequence[Zone], frame: Frame) -> list[Floats]:
     return np.split(frame.to_degrees(corners[:, 0], corners[:, 1]), np.cumsum([len(r) for r in rings])[:-1])
 
 
-def extent_words(zone: Zone) -> str:
+def areas_deg(areas: Sequence[KeepIn], frame: Frame) -> list[tuple[KeepIn, list[Floats]]]:
+    """Each part of each keep-in area: its outline, then its holes, (N, 2) latitude, longitude, not closed."""
+    return [
+        (area, [frame.to_degrees(*ring.T) for ring in (part.outline, *part.holes)])
+        for area in areas
+        for part in area.parts
+    ]
+
+
+def extent_words(zone: Zone | KeepIn) -> str:
     """The range of heights of a zone, in words."""
 
     def words(level: Level | None, none: str) -> str:

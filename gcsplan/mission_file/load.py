@@ -81,8 +81,10 @@ from gcsplan.mission_file.zones.draft import (
     zone_notes,
     zones_sha256,
 )
+from gcsplan.mission_file.zones.keep_in import apart, as_keep_in, place_keep_in
 from gcsplan.notes.note import Note
 from gcsplan.world.geodesy.frame import Frame
+from gcsplan.world.geometry.zones import KeepIn
 from gcsplan.world.terrain.model_words import notes_on
 from gcsplan.world.terrain.terrain import OpenTerrain, Terrain, TerrainSpec
 
@@ -193,7 +195,7 @@ class _MissionReading:
         arrival_keys = self._section(ArrivalKeys, "arrival")
         arrival = make_arrival(arrival_keys, names, f"{self.where}arrival", problems)
         hours = self._hours()
-        published = self._zones(hours)
+        published, inside = self._zones(hours)
         drafts = used(published)
 
         spec = None if terrain_keys is None else make_spec(terrain_keys, self.file.parent)
@@ -217,14 +219,15 @@ class _MissionReading:
                 problems += faults_near(placed, box)
                 self.notes += not_understood_far(placed, far, box)
                 self.notes += unused_notes(published, frame, box)
-                site = MissionPlane(here, frame, box, placed, terminals, set(places), self.local)
+                areas = self._areas(inside, frame)
+                site = MissionPlane(here, frame, box, placed, areas, terminals, set(places), self.local)
                 ground = site.load(problems)
         if problems or frame is None or site is None or ground is None:
             raise self._refusal(problems)
         info = ground.surface.info
         self.notes += notes_on(info)
         inputs = {k: v for k, v in info.items() if k not in ("notes", "source")}
-        inputs["zones_sha256"] = zones_sha256(drafts)
+        inputs["zones_sha256"] = zones_sha256([*drafts, *inside])
         source = MissionFile(
             name=name, path=self.file, stem=self.file.stem, frame=frame, surface=ground.surface, zones=ground.zones,
             airspace_scale=ground.scale, vehicles=ground.vehicles, arrival=arrival, planner=planner,
@@ -237,12 +240,13 @@ class _MissionReading:
 
     def zones_alone(self) -> tuple[list[ZoneDraft], list[Note]]:
         """All zones, far ones and those that are not used too, and the notes on them. Raises InputError."""
-        self.problems = [p for p in self.problems if p.where.startswith(f"{self.where}no_fly")]
+        keys = (f"{self.where}no_fly", f"{self.where}keep_in")
+        self.problems = [p for p in self.problems if p.where.startswith(keys)]
         self.notes = []
-        published = self._zones(self._hours())
+        published, inside = self._zones(self._hours())
         if self.problems:
             raise self._refusal(self.problems)
-        return published, list(dict.fromkeys(self.notes))
+        return [*published, *inside], list(dict.fromkeys(self.notes))
 
     def _reaching(self, places: Sequence[tuple[float, float]]) -> MissionFile:
         return load_content(replace(self.content, around=tuple(places)))
@@ -362,28 +366,38 @@ class _MissionReading:
         given, content = self.raw.get("at"), self.content
         return hours_of(given, content.departure, f"{self.where}at", self.problems, instead=content.at)
 
-    def _zones(self, hours: Hours | None) -> list[ZoneDraft]:
-        where = f"{self.where}no_fly"
-        value = self.raw.get("no_fly")
-        if value is not None and not isinstance(value, list):
-            dash = "; begin each zone with a dash: `- name: …`" if isinstance(value, dict) else ""
-            self.problems.append(Mistake(where, f"must be a list of zones, given {shown(value)}{dash}"))
+    def _zones(self, hours: Hours | None) -> tuple[list[ZoneDraft], list[ZoneDraft]]:
+        """The no-fly zones, and the areas to stay in. A file of ``no_fly`` may have areas, too: a world with holes."""
         drafts: list[ZoneDraft] = []
-        inline: dict[str, int] = {}
-        for i, one in enumerate(self._list("no_fly")):
-            at = f"{where}[{i}]"
-            keys = read_section(ZoneKeys, one, at, self.problems)
-            if keys is None:
-                continue
-            if keys.name is not None and inline.setdefault(keys.name, i) != i:
-                first = inline[keys.name]
-                self.problems.append(
-                    Mistake(f"{at}.name", f"{keys.name[:64]!r} is the name of no_fly[{first}] already; change one")
-                )
-            drafts += make_zones(
-                keys, at, self.file.parent, f"no_fly[{i}]", self.problems, self.notes, local=self.local, hours=hours
-            )
-        return uniquely_named(drafts)
+        inline: dict[str, str] = {}
+        for key, what in (("no_fly", "zones"), ("keep_in", "areas")):
+            value = self.raw.get(key)
+            if value is not None and (not isinstance(value, list) or (key == "keep_in" and not value)):
+                dash = f"; begin each {what[:-1]} with a dash: `- name: …`" if isinstance(value, dict) else ""
+                empty = "; leave the key out if a flight may be anywhere" if value == [] else ""
+                words = f"must be a list of {what}, given {shown(value)}{dash}{empty}"
+                self.problems.append(Mistake(self.where + key, words))
+            for i, one in enumerate(self._list(key)):
+                at, entry = f"{self.where}{key}[{i}]", f"{key}[{i}]"
+                keys = read_section(ZoneKeys, one, at, self.problems)
+                if keys is None:
+                    continue
+                if keys.name is not None and (first := inline.setdefault(keys.name, entry)) != entry:
+                    words = f"{keys.name[:64]!r} is the name of {first} already; change one"
+                    self.problems.append(Mistake(f"{at}.name", words))
+                found = make_zones(
+                    keys, at, self.file.parent, entry, self.problems, self.notes, local=self.local, hours=hours,
+                    keep_in=key == "keep_in",
+                )  # fmt: skip
+                drafts += as_keep_in(found, at, self.problems) if key == "keep_in" else found
+        return apart(uniquely_named(drafts), self.problems)
+
+    def _areas(self, inside: Sequence[ZoneDraft], frame: Frame) -> tuple[KeepIn, ...]:
+        try:
+            return place_keep_in(inside, frame)
+        except InputError as why:
+            self.problems += why.problems
+            return ()
 
     def _far(self, far: list[ZoneDraft], frame: Frame) -> None:
         """Report zones too far away to matter: a mistake in this file, but normal in a zone file of a whole country."""

@@ -136,6 +136,7 @@ def _limits(draft: Draft) -> Iterator[KeyRow]:
     )
     yield LimitKeys, "max_amsl_m", "1500", False
     yield LimitKeys, "horizontal_clearance_m", "30", True
+    yield LimitKeys, "vertical_clearance_m", "10", False
     yield LimitKeys, "track_error_m", "10" if wing else "3", True
     yield LimitKeys, "altitude_error_m", "8" if wing else "5", True
     yield LimitKeys, "max_climb_deg", "8" if wing else "15", True

@@ -6,7 +6,7 @@ Everything is judged by the same rules as in a mission file; a mistake is report
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -27,7 +27,7 @@ from gcsplan.mission_file.published.unused import (
     unused_notes,
     used,
 )
-from gcsplan.mission_file.scene import make_spec, settle_zones
+from gcsplan.mission_file.scene import make_spec, settle_areas, settle_zones
 from gcsplan.mission_file.values.errors import read_section
 from gcsplan.mission_file.values.schema import LimitKeys, TerrainKeys, VehicleKeys
 from gcsplan.mission_file.vehicles import make_vehicle
@@ -41,6 +41,7 @@ from gcsplan.mission_file.zones.draft import (
     zones_sha256,
 )
 from gcsplan.mission_file.zones.file import Ignorable, OnBad
+from gcsplan.mission_file.zones.keep_in import apart, as_keep_in, outside_zones, place_keep_in
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.airspace import Airspace
@@ -55,7 +56,8 @@ MARGIN_M, MARGIN_MOST_M = 500.0, 3000.0
 
 KEY_OPTIONS = {
     "min_agl_m": "--min-agl", "max_agl_m": "--max-agl", "max_amsl_m": "--max-amsl", "speed_m_s": "--speed",
-    "horizontal_clearance_m": "--clearance", "track_error_m": "--track-error", "climb_m_s": "--climb-rate",
+    "horizontal_clearance_m": "--clearance", "vertical_clearance_m": "--vertical-clearance",
+     "track_error_m": "--track-error", "climb_m_s": "--climb-rate",
     "altitude_error_m": "--altitude-error", "max_climb_deg": "--max-climb", "max_descent_deg": "--max-descent",
     "descent_m_s": "--descent-rate", "dem": "--dem", "vertical_datum": "--vertical-datum", "autopilot": "--autopilot",
     "geoid_grid": "--geoid-grid", "obstacle_height_m": "--obstacle-height", "start": "--home",
@@ -85,6 +87,7 @@ class WorldOptions:
     at: tuple[str, ...] | None = None
     on_bad: OnBad | None = None
     ignore: tuple[Ignorable, ...] = ()
+    keep_in: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +107,7 @@ class OpenWorld:
         self.notes: list[Note] = [*options.notes]
         hours = hours_of(None, None, "--at", problems, instead=options.at)
         policy = Policy(hours=hours, where="--zones", on_bad=options.on_bad, ignore=options.ignore)
-        self._drafts = _drafts(options.zones, problems, self.notes, policy)
+        self._drafts, self._inside = apart(_drafts(options, problems, self.notes, policy), problems)
         self.hours = hours if left_out_by_hours(self._drafts) else None
         self._terrain: OpenTerrain | None = None
         self._made: dict[str, Vehicle] = {}
@@ -197,12 +200,13 @@ class OpenWorld:
             problems += own
         if problems:
             raise InputError.of([_renamed(p) for p in problems])
+        zones += outside_zones(settle_areas(place_keep_in(self._inside, frame), surface), local=False)
         notes = [*self.notes, *notes_on(surface.info), *zone_notes(placed), *not_understood_far(placed, far, box)]
         notes += unused_notes(self._drafts, frame, box)
         if far:
             notes.append(Note("zones_left_out", count=len(far)))
         inputs = {k: v for k, v in surface.info.items() if k not in ("notes", "source")}
-        inputs["zones_sha256"] = zones_sha256(drafts)
+        inputs["zones_sha256"] = zones_sha256([*drafts, *self._inside])
         inputs["notes"] = tuple(dict.fromkeys(notes))
         return World(frame, Airspace(surface, zones, scale=scale)), inputs
 
@@ -215,18 +219,23 @@ class OpenWorld:
         return low[0] - margin, low[1] - margin, high[0] + margin, high[1] + margin
 
 
-def _drafts(files: Sequence[str], problems: list[Mistake], notes: list[Note], policy: Policy) -> list[ZoneDraft]:
-    """The zones of all files, each with a unique name; those are not used that do not apply in the hours."""
+def _drafts(
+    options: WorldOptions, problems: list[Mistake], notes: list[Note], policy: Policy
+) -> list[ZoneDraft]:  # fmt: skip
+    """The zones and keep-in areas of all files, each with a unique name; a zone that does not apply in the hours is not
+    used."""
     drafts: list[ZoneDraft] = []
-    for file in files:
-        try:
-            found = read_zones(Path(file), where="--zones", policy=policy)
-        except InputError as why:
-            problems += why.problems
-            continue
-        problems += found.problems
-        notes += found.notes
-        drafts += found.zones
+    for option, files in (("--zones", options.zones), ("--keep-in", options.keep_in)):
+        for file in files:
+            inside = option == "--keep-in"
+            try:
+                found = read_zones(Path(file), where=option, policy=replace(policy, where=option), keep_in=inside)
+            except InputError as why:
+                problems += why.problems
+                continue
+            problems += found.problems
+            notes += found.notes
+            drafts += as_keep_in(found.zones, option, problems) if inside else found.zones
     return uniquely_named(drafts)
 
 

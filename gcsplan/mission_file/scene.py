@@ -29,7 +29,7 @@ from gcsplan.notes.note import Note
 from gcsplan.world.geodesy.degree_shapes import MOST_LON_DEG
 from gcsplan.world.geodesy.frame import FARTHEST_M, Frame, centre_of
 from gcsplan.world.geometry.surface import Surface
-from gcsplan.world.geometry.zones import Box, Circle, Level, Zone
+from gcsplan.world.geometry.zones import Box, Circle, KeepIn, Level, Polygon, Zone
 from gcsplan.world.terrain.peaks import Peak
 from gcsplan.world.terrain.terrain import OpenTerrain, TerrainSpec
 
@@ -37,6 +37,9 @@ MARGIN_M, MARGIN_PART, MARGIN_MOST_M = 3000.0, 1.0, 25_000.0
 """Margin for detours: the first, m, or this part of the points' extent if larger, up to the third, m."""
 
 LOCAL_MARGIN_M, LOCAL_MARGIN_PART = 50.0, 0.5
+
+FLOOR_NOISE_M = 1e-6
+"""A floor of an area this much above the ground, m, is on it: rounding."""
 
 OF_FILES = {"kinds", "authorised", "flight_level_error_m"}
 """Keys of a zone that belong to a file of an authority."""
@@ -208,9 +211,12 @@ def make_box(points: Sequence[tuple[float, float]], zones: Sequence[Zone], *, lo
 
 def make_zones(
     keys: ZoneKeys, where: str, folder: Path, fallback: str, problems: list[Mistake], notes: list[Note], *, local: bool,
-    hours: Hours | None = None,
+    hours: Hours | None = None, keep_in: bool = False,
 ) -> list[ZoneDraft]:  # fmt: skip
-    """The zones of one entry of ``no_fly``: a single zone, or all zones of a file, at the mission's ``hours``."""
+    """The zones of one entry of ``no_fly`` or ``keep_in``: a single one, or all of a file, at the mission's ``hours``.
+
+    With ``keep_in`` a file's holes are left out of its areas, and no file of an authority is read.
+    """
     kinds = [k for k in ("center", "polygon", "line", "file") if getattr(keys, k) is not None]
     if len(kinds) != 1:
         given = " and ".join(kinds) or "none"
@@ -218,7 +224,7 @@ def make_zones(
         problems.append(Mistake(where, f"{choices}, given {given}"))
         return []
     if keys.file is not None:
-        return _zones_of_file(keys, keys.file, where, folder, problems, notes, hours)
+        return _zones_of_file(keys, keys.file, where, folder, problems, notes, hours, keep_in=keep_in)
     for key in sorted({"on_bad", "ignore", *OF_FILES} & keys.given.keys()):
         whose = " of an authority" if key in OF_FILES else ""
         problems.append(Mistake(f"{where}.{key}", f"belongs to a file{whose}"))
@@ -226,8 +232,9 @@ def make_zones(
 
 
 def _zones_of_file(
-    keys: ZoneKeys, file: str, where: str, folder: Path, problems: list[Mistake], notes: list[Note], hours: Hours | None
-) -> list[ZoneDraft]:
+    keys: ZoneKeys, file: str, where: str, folder: Path, problems: list[Mistake], notes: list[Note],
+    hours: Hours | None, *, keep_in: bool,
+) -> list[ZoneDraft]:  # fmt: skip
     others = sorted(keys.given.keys() - {"file", "layer", "on_bad", "ignore", *SIZE_KEYS, *OF_FILES})
     words = "stands in the file itself, in a feature's properties; leave it out here"
     problems += [Mistake(f"{where}.{k}", words) for k in others]
@@ -245,7 +252,7 @@ def _zones_of_file(
         )
         found = read_zones(
             folder / file, where=f"{where}.file", radius_m=keys.radius_m, buffer_m=keys.buffer_m, layer=keys.layer,
-            policy=policy,
+            policy=policy, keep_in=keep_in,
         )  # fmt: skip
     except InputError as why:
         problems += why.problems
@@ -333,6 +340,19 @@ def settle_zones(placed: Sequence[tuple[ZoneDraft, Zone]], surface: Surface, pro
                 zone = replace(zone, floor=None)
         zones.append(zone)
     return zones
+
+
+def settle_areas(areas: Sequence[KeepIn], surface: Surface) -> list[KeepIn]:
+    """The keep-in areas after comparison with the ground: a floor that is nowhere above it is removed."""
+    settled = []
+    for area in areas:
+        if area.floor is not None and area.floor.datum == "amsl":
+            ranges = [_ground_under(Zone(area.name, Polygon(part.outline)), surface) for part in area.parts]
+            lows = [ground[0] for ground in ranges if ground is not None]
+            if lows and area.floor.value_m <= min(lows) + FLOOR_NOISE_M:
+                area = replace(area, floor=None)
+        settled.append(area)
+    return settled
 
 
 def zone_around(zones: Sequence[Zone], east_m: float, north_m: float, amsl_m: float, ground_m: float) -> Zone | None:

@@ -125,8 +125,25 @@ def _end(
         problems.append(Mistake(place.where, f"hangs {above_m:g} m above ground: leave {key} out"))
     zone = zone_around(zones, east, north, ground_m + above_m, ground_m)
     if zone is not None:
-        problems.append(Mistake(place.where, f"the {what} lies inside the no-fly zone {zone.name!r}{ELSEWHERE}"))
+        problems.append(Mistake(place.where, f"the {what} lies {_in_zone(zone, east, north)}"))
     return _End(at, ground_m + above_m if above_m > 0.0 else None)
+
+
+def _in_zone(zone: Zone, east_m: float, north_m: float) -> str:
+    """Where a place lies that is inside a zone, and what to do about it."""
+    if zone.outside is None:
+        return f"inside the no-fly zone {zone.name!r}{ELSEWHERE}"
+    near = min(zone.outside.areas, key=lambda area: area.distance_m(east_m, north_m))
+    off_m = near.distance_m(east_m, north_m)
+    how = (
+        f"{off_m:.1f} m "
+        if 0.0 < off_m < math.inf
+        else "below its floor or above its ceiling, "
+        if off_m == 0.0
+        else ""
+    )
+    many = " and outside of all others" if len(zone.outside.areas) > 1 else ""
+    return f"{how}outside of the keep-in area {near.name!r}{many}: move it inside, or draw the area larger"
 
 
 def _via(
@@ -144,5 +161,5 @@ def _via(
     else:
         zone = zone_around(zones, east, north, ground_m + agl_m, ground_m)
     if zone is not None:
-        problems.append(Mistake(place.where, f"lies inside the no-fly zone {zone.name!r}{ELSEWHERE}"))
+        problems.append(Mistake(place.where, f"lies {_in_zone(zone, east, north)}"))
     return east, north, agl_m

@@ -293,6 +293,7 @@ def _limits(
             merged[key] = 0.0 if local else default
             if not local:
                 notes.append(Note("limit_assumed", limit=key, value=default))
+    merged["vertical_clearance_m"] = merged.get("vertical_clearance_m") or 0.0
     if merged.get("max_climb_deg") is None:
         merged["max_climb_deg"] = 90.0
         if keys.autopilot == "arduplane":

@@ -16,12 +16,13 @@ import numpy as np
 
 from gcsplan.errors import InputError, Mistake
 from gcsplan.mission_file.request import MissionFile, VehicleRequest
-from gcsplan.mission_file.scene import LOCAL_MARGIN_M, MARGIN_M, MissionPlace, settle_zones
+from gcsplan.mission_file.scene import LOCAL_MARGIN_M, MARGIN_M, MissionPlace, settle_areas, settle_zones
 from gcsplan.mission_file.terminals import Terminals, make_request
 from gcsplan.mission_file.zones.draft import ZoneDraft
+from gcsplan.mission_file.zones.keep_in import outside_zones
 from gcsplan.world.geodesy.frame import FARTHEST_M, Frame
 from gcsplan.world.geometry.surface import Surface
-from gcsplan.world.geometry.zones import Box, Zone
+from gcsplan.world.geometry.zones import Box, KeepIn, Zone
 from gcsplan.world.terrain.model_words import notes_on
 from gcsplan.world.terrain.terrain import RASTER_SPARE_M, OpenTerrain, Terrain, TerrainSpec, open_terrain
 
@@ -61,13 +62,15 @@ class GroundWindow:
 class MissionPlane:
     """A mission's places in its plane.
 
-    ``box`` (west, south, east, north) is the first window. ``good`` are the places of ``terminals`` on the terrain.
+    ``box`` (west, south, east, north) is the first window, ``areas`` are those to stay in. ``good`` are the places of
+    ``terminals`` on the terrain.
     """
 
     terrain: Terrain
     frame: Frame
     box: Box
     placed: PlacedZones
+    areas: Sequence[KeepIn]
     terminals: Sequence[Terminals]
     good: Collection[MissionPlace]
     local: bool
@@ -123,7 +126,12 @@ class MissionPlane:
         except InputError as why:
             problems += why.problems
             return None
-        zones = settle_zones(self.placed, surface, problems)
+        try:
+            outside = outside_zones(settle_areas(self.areas, surface), local=self.local)
+        except InputError as why:
+            problems += why.problems
+            return None
+        zones = [*settle_zones(self.placed, surface, problems), *outside]
         requests = [make_request(s, self.frame, surface, zones, self.good, problems) for s in self.terminals]
         return GroundWindow(surface, tuple(zones), scale, tuple(r for r in requests if r is not None))
 

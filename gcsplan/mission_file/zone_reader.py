@@ -21,6 +21,7 @@ from gcsplan.mission_file.zones.fence import is_fence, read_fence
 from gcsplan.mission_file.zones.file import OnBad, ZoneFile
 from gcsplan.mission_file.zones.geojson import read_geojson
 from gcsplan.mission_file.zones.kml import read_kml
+from gcsplan.mission_file.zones.plan_fence import read_plan_fence
 from gcsplan.world.terrain.input_files import (
     FENCE_ZONES,
     JSON_ZONES,
@@ -30,6 +31,8 @@ from gcsplan.world.terrain.input_files import (
     absent,
     tell_file,
 )
+
+PLAN = ".plan"
 
 MAX_ZONE_BYTES = 20_000_000
 """Most bytes of a file, and of what is unpacked from one."""
@@ -43,8 +46,9 @@ def read_zones(
     buffer_m: float | None = None,
     layer: str | None = None,
     policy: Policy | None = None,
+    keep_in: bool = False,
 ) -> ZoneFile:
-    """The zones of a file in any of the formats.
+    """The zones of a file in any of the formats; with ``keep_in`` they become areas to stay in, without their holes.
 
     ``where`` is the key that the zones belong to, ``radius_m`` the radius of points and ``buffer_m`` the half-width
     around lines that have none of their own, ``layer`` the only layer to read, and ``policy`` says which published
@@ -53,23 +57,26 @@ def read_zones(
     Mistakes in single features are collected in ``problems``; a file that cannot be read at all raises InputError.
     """
     kind = path.suffix.lower()
-    if kind not in (*ZONE_FILES, *FENCE_ZONES, *OPENAIR_ZONES):
-        known = f"{', '.join((*ZONE_FILES, *FENCE_ZONES))} and OpenAir ({', '.join(OPENAIR_ZONES)}) files"
+    if kind not in (*ZONE_FILES, *FENCE_ZONES, PLAN, *OPENAIR_ZONES):
+        known = f"{', '.join((*ZONE_FILES, *FENCE_ZONES, PLAN))} and OpenAir ({', '.join(OPENAIR_ZONES)}) files"
         raise InputError(f"zones are read from {known}, given {path.name}", where=where)
     if layer is not None and kind not in VECTOR_ZONES:
         raise InputError(f"a {kind} file has no layers; leave `layer` out", where=where)
     policy = policy or Policy()
     data = _bytes(path, where)
-    whole = load_json(path, data) if kind in JSON_ZONES else None
+    whole = load_json(path, data) if kind in (*JSON_ZONES, PLAN) else None
     require_wgs84(whole, path, json_format(whole)[0])
     in_part = sent_in_part(whole, path)
-    found = read_published(path, data, whole, policy)
+    found = None if kind == PLAN else read_published(path, data, whole, policy)
+    if found is not None and keep_in:
+        words = f"{path.name} is a file of an authority, whose zones are no-fly: draw the area that may be flown"
+        raise InputError(f"{words} as a polygon, here or in a .geojson or .kml", where=where)
     on_bad: OnBad = policy.on_bad or ("refuse" if found is None else "strict")
     if found is None:
         for key in policy.keys:
             words = f"{path.name} is no file of an authority (OpenAir, ED-269, ED-318, openAIP), and has no {key}"
             raise InputError(words, where=f"{policy.where}.{key}")
-        found = read_geojson(path, whole) if kind in JSON_ZONES else _read(path, kind, data, layer)
+        found = read_geojson(path, whole) if kind in JSON_ZONES else _read(path, kind, data, layer, whole)
         ignore_at = policy.place_of("ignore", "--ignore")
         found.give_sizes(radius_m, buffer_m, policy.ignore, ignore_at, skip=on_bad == "skip")
     elif policy.ignore and not policy.by_options:
@@ -78,10 +85,13 @@ def read_zones(
     found.refusals[:0] = in_part
     skipped = "--on-bad skip" if policy.by_options else "on_bad: skip"
     found.settle(on_bad, f"leave it out by name ({skipped})")
+    found.holes = 0 if keep_in else found.holes
     return found
 
 
-def _read(path: Path, kind: str, data: bytes, layer: str | None) -> ZoneFile:
+def _read(path: Path, kind: str, data: bytes, layer: str | None, whole: Any) -> ZoneFile:
+    if kind == PLAN:
+        return read_plan_fence(path, whole)
     if kind == ".kmz":
         return read_kml(path, unpack(path, data, [".kml"], MAX_ZONE_BYTES)[".kml"])
     if kind in (*FENCE_ZONES, *OPENAIR_ZONES):

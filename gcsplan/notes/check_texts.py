@@ -257,6 +257,10 @@ CHECK_TEXTS = {
         "too near to rising ground at flight level: {value_m:height.2}, limit {limit_m:height.2} (by {by_m:height.2}) "
         "at {lat:.6f}, {lon:.6f}, {amsl_m:amsl.1}"
     ),
+    "outside_keep_in": (
+        "leaves keep-in area “{zone}”, or comes too near to its edge (by {by_m:distance.2}), at {lat:.6f}, {lon:.6f}, "
+        "{amsl_m:amsl.1}"
+    ),
     "inside_zone": (
         "inside no-fly zone “{zone}” or its clearance (by {by_m:distance.2}) at {lat:.6f}, {lon:.6f}, {amsl_m:amsl.1}"
     ),
@@ -361,6 +365,10 @@ CHECK_TEXTS = {
     "flew_near_rising_ground": (
         "{name} came too near to rising ground at its level by {by_m:height.2} at {time_s:seconds.1}, item {item} "
         "({lat:.6f}, {lon:.6f}, {amsl_m:amsl.1})"
+    ),
+    "flew_out_of_keep_in": (
+        "{name} left keep-in area “{zone}”, or came too near to its edge, by {by_m:distance.2} at {time_s:seconds.1}, "
+        "item {item} ({lat:.6f}, {lon:.6f}, {amsl_m:amsl.1})"
     ),
     "flew_into_zone": (
         "{name} came into no-fly zone “{zone}” or its clearance by {by_m:distance.2} at {time_s:seconds.1}, item "
@@ -479,6 +487,7 @@ CHECK_TEXTS = {
     ),
     "at_place": " at {lat:.6f}, {lon:.6f} ({amsl_m:amsl.0})",
     "does_meet_zone": "meets no-fly zone “{zone}”{height} or its clearance",
+    "does_leave_keep_in": "leaves {areas}{height} or comes too near to the edge",
     "zone_without_top": " (no top)",
     "zone_from": " (from {bottom_m:amsl.0} up)",
     # -- returns that join the mission -------------------------------------------------------------------------------
@@ -507,6 +516,7 @@ CHECK_TEXTS = {
     "way_descends_too_steeply": "descends more steeply than {key:max_descent_deg}",
     "way_meets_ground": "meets ground",
     "way_breaks_limit": "breaks a limit",
+    "way_leaves_keep_in": "leaves {areas} or comes too near to the edge",
     "way_meets_zone": "meets no-fly zone “{zone}”",
     "way_meets_clearance": "meets no-fly zone “{zone}” or its clearance",
     "nothing_to_join": "the mission holds neither {one} nor {other}: there is nothing that a return joins",

@@ -128,6 +128,17 @@ INPUT_TEXTS = {
     "item_without_place": "{entry} has no place: it was read as 0, 0, which ArduPilot takes for 'here'",
     "fence_without_heights": ("a fence has no height: {names} would be forbidden from the ground to the sky on board"),
     "fence_leaves_out": ("a fence has no height: {names} {names:is|are} left out of it, having a floor or a ceiling"),
+    "fence_of_one_piece": (
+        "the keep-in areas lie apart in {count} pieces: the fence is of the piece around home, which no flight leaves"
+    ),
+    "fence_areas_without_heights": (
+        "a fence has no height: it keeps the aircraft in {names} from the ground to the sky; only the check knows "
+        "their floors and ceilings"
+    ),
+    "fence_area_wider": (
+        "the keep-in areas have {given} corners, more than the autopilot stores: its fence has {corners}, and is drawn "
+        "around them, larger by up to {wider_m:distance}"
+    ),
     "fence_circles_inside": "{names} {names:lies|lie} inside another circle of the fence",
     # -- no-fly zones: how their files were read, what of them is not used, and what each zone has of its own --
     # -- of the zones that the note names behind its sentence --
@@ -210,6 +221,10 @@ INPUT_TEXTS = {
     "zones_skipped": "left out, because their outlines are not understood",
     "shapes_ignored": "left out, because these are {kind}",
     # -- how a file was read --
+    "fence_areas_joined": (
+        "the {count} inclusion areas of the fence are joined: a flight may be in any of them (by default ArduPilot's "
+        "own fence demands to be in all of them)"
+    ),
     "holes_are_no_fly": "{count} {count:hole|holes} in polygons counted as no-fly",
     "terrain_records_unused": "not used, because they draw terrain: {records}",
     "fence_return_points_unused": "not used: {count} {count:point|points} to which a fence sends the aircraft",

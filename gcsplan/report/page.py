@@ -48,6 +48,7 @@ from gcsplan.report.views.scene_data import exaggeration, zone_meshes
 from gcsplan.report.views.shaded_terrain import Relief, extent_of, relief_of
 from gcsplan.report.views.tables import headline, rehearsal_html
 from gcsplan.units import KILOJOULE, Unit, Units, duration, in_units
+from gcsplan.world.geometry.zones import no_fly_of, on_map
 from gcsplan.world.terrain.model_words import what_is_not_in
 from gcsplan.world.world import World
 
@@ -76,9 +77,11 @@ def render_page(page: Page) -> str:
     ]
     drawn = [line for line in lines if line is not None]
     zones, surface = page.world.airspace.zones, page.world.airspace.surface
-    relief = relief_of(page.world, extent_of(drawn, zones, surface), page.units.height)
+    no_fly = no_fly_of(zones)
+    crossed = (*no_fly, *(zone for zone in zones if zone not in on_map(zones)))
+    relief = relief_of(page.world, extent_of(drawn, no_fly, surface), page.units.height)
     found = [
-        passages(line, zones, _reach_m(subject)) if line is not None and i in full else []
+        passages(line, crossed, _reach_m(subject)) if line is not None and i in full else []
         for i, (subject, line) in enumerate(zip(page.subjects, lines, strict=True))
     ]
     charts: dict[str, object] = {}
@@ -92,7 +95,7 @@ def render_page(page: Page) -> str:
             for i, (s, line) in enumerate(zip(page.subjects, lines, strict=True))
             if line is not None
         ],
-        "zones": zone_meshes(zones, surface, relief, drawn),
+        "zones": zone_meshes(no_fly, surface, relief, drawn),
         "exaggeration": exaggeration(relief, drawn),
         "charts": charts, "units": page.units.as_dict(), "replay": replay_data(replay, page) if replay else None,
     }  # fmt: skip

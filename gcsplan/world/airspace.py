@@ -338,7 +338,7 @@ class Airspace:
         by = np.where(steep, np.maximum(np.abs(climb_deg[leg]) - limit, ANGLE_DEG), by)
         value = limit + np.where((kind == MIN_AGL) | (kind == TERRAIN) | (kind == COVERAGE), -by, by)
         value = np.where(kind == COVERAGE, np.maximum(value, 0.0), value)
-        hit_value, hit_t = self._depths(legs, hit, hit_at)
+        hit_value, hit_t = self._depths(legs, limits, hit, hit_at)
         hit_reach = reach[hit[:, 0]]
         leg = np.concatenate([leg, hit[:, 0]])
         at = np.concatenate([at, hit_t])
@@ -360,7 +360,7 @@ class Airspace:
             for i, k, t, e, n, h, v, lim, off, zone in rows
         )
 
-    def _depths(self, legs: Legs, hit: Indices, hit_at: Floats) -> tuple[Floats, Floats]:
+    def _depths(self, legs: Legs, limits: Limits, hit: Indices, hit_at: Floats) -> tuple[Floats, Floats]:
         """Signed distances to broken zones, never too large, and where on the leg.
 
         The kernel returns 0 anywhere inside a polygon, and any place inside a zone over ground: there the deepest place
@@ -376,7 +376,7 @@ class Airspace:
                 continue
             if value[row] > 0.0 or not (over_ground or isinstance(shape, Polygon)):
                 continue
-            a, b, error = legs.start[leg], legs.end[leg], legs.altitude_error_m[leg]
+            a, b, error = legs.start[leg], legs.end[leg], legs.altitude_error_m[leg] + limits.vertical_clearance_m
             part = np.array([0.0, 1.0])
             if a[2] != b[2]:
                 low, high = (BAND_LOW, BAND_HIGH) if over_ground else (FLOOR, CEILING)
@@ -384,7 +384,7 @@ class Airspace:
                 part = np.sort((levels - a[2]) / (b[2] - a[2])).clip(0.0, 1.0)
             p, q = a[:2] + part[:, None] * (b - a)[:2]
             if isinstance(shape, Polygon):
-                depth, t = deepest_inside(shape.vertices, p, q)
+                depth, t = deepest_inside(self.zones[k].edges, p, q)
             else:
                 depth, t = deepest_in_circle(shape, shape.radius_m * self.scale, p, q)
             if depth > -value[row]:

@@ -160,7 +160,7 @@ def over(
         found.append((line, s0, high, legal))
     line, s0, high, legal = (np.concatenate(parts) for parts in zip(*found, strict=True))
     clearance_m = limits.horizontal_clearance_m * air.scale
-    crossings = _crossings(air, starts, ends, reach, wide_m, error, swept, clearance_m)
+    crossings = _crossings(air, starts, ends, reach, wide_m, limits.over_zone_m, swept, clearance_m)
     return LevelLines(clear_m, legal_m, ceiling_m, crossings, line, s0, high, legal)
 
 

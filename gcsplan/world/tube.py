@@ -146,7 +146,7 @@ def _bands(
     extrema: Callable[[bool, float], Held], reach: Reaches, grounds: Held,
 ) -> tuple[Band, ...]:  # fmt: skip
     """One band for each span of the track within reach of a zone, by zone and distance along the track."""
-    error = limits.altitude_error_m
+    error = limits.over_zone_m
     wide = reach.far_m + ZONE_ROOM_M
     length = distances_m(track)
     out: list[Band] = []

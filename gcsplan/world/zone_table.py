@@ -353,8 +353,8 @@ def _polygon(corners: Floats, unit: Floats, reach: float, length: float) -> list
     return out
 
 
-def deepest_inside(corners: Floats, start: Floats, end: Floats) -> tuple[float, float]:
-    """Greatest distance from a polygon's border of a segment's point inside it, and where on the segment (0 … 1).
+def deepest_inside(edges: Floats, start: Floats, end: Floats) -> tuple[float, float]:
+    """Greatest distance from a border, ``edges`` (E, 2, 2), of a segment's point inside it, and where on it (0 … 1).
 
     Never too small, and too large by at most `DEEP_M` or `DEEP_PART` of it, unless `MOST_LOOKS` places end the search
     early; 0 if no part is inside. For reports.
@@ -363,7 +363,7 @@ def deepest_inside(corners: Floats, start: Floats, end: Floats) -> tuple[float, 
     best, at, looks = 0.0, 0.5, 0
     middle, half = np.linspace(0.0, 1.0, 33), 1.0 / 64
     while len(middle):
-        depth = _depth_inside(corners, start + middle[:, None] * (end - start))
+        depth = _depth_inside(edges, start + middle[:, None] * (end - start))
         k = int(depth.argmax())
         if depth[k] > best:
             best, at = float(depth[k]), float(middle[k])
@@ -385,9 +385,9 @@ def deepest_in_circle(shape: Circle, radius_m: float, p: Floats, q: Floats) -> t
     return radius_m - float(np.hypot(*(to - t * way))), t
 
 
-def _depth_inside(corners: Floats, p: Floats) -> Floats:
-    """(N,) signed distance of points (N, 2) from a polygon's border, positive inside."""
-    after = np.roll(corners, -1, axis=0)
+def _depth_inside(edges: Floats, p: Floats) -> Floats:
+    """(N,) signed distance of points (N, 2) from a border of edges (E, 2, 2), positive inside."""
+    corners, after = edges[:, 0], edges[:, 1]
     edge = after - corners
     away = p[:, None] - corners
     w = ((away * edge).sum(-1) / np.maximum((edge * edge).sum(-1), 1e-30)).clip(0.0, 1.0)

@@ -9,10 +9,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import rasterio
+import shapely
 import yaml
 from pyproj import Transformer
 from scipy.ndimage import gaussian_filter
@@ -73,6 +75,21 @@ class Case:
     objective: str = "length"
     altitude_frame: str = "relative"
     arrival: dict[str, object] | None = None
+    inside_m: float = 0.0
+    """Above 0: what is free within so many metres around all is written as keep-in areas, and no zone is."""
+
+    def areas(self) -> list[Floats]:
+        """Rings that share edges: together the box around all, without the barriers."""
+        ends = [[v[k]["east_m"], v[k]["north_m"]] for v in self.vehicles for k in ("start", "goal")]  # type: ignore[index]
+        every = np.vstack([*(b.ring for b in self.barriers), ends])
+        box = [*(every.min(axis=0) - self.inside_m), *(every.max(axis=0) + self.inside_m)]
+        shut = shapely.union_all([shapely.Polygon(b.ring) for b in self.barriers])
+        free = shapely.difference(shapely.box(*box), shut)
+        holes = [shapely.Polygon(h).bounds for p in shapely.get_parts(free) for h in p.interiors]
+        cuts = sorted({box[0], *(0.5 * (w + e) for w, _, e, _ in holes), box[2]})
+        slabs = (shapely.intersection(free, shapely.box(w, box[1], e, box[3])) for w, e in pairwise(cuts))
+        parts = [p for slab in slabs for p in shapely.get_parts(slab) if p.geom_type == "Polygon"]
+        return [np.asarray(p.exterior.coords)[:-1] for p in parts]
 
     def document(self, *, filled: bool = False, barriers: bool = True, ceilings: bool = True) -> dict[str, object]:
         """The mission file, or one with known ground in the voids, without zones, or without ceilings."""
@@ -86,6 +103,11 @@ class Case:
             "vehicles": self.vehicles, "altitude_frame": self.altitude_frame,
             "planner": {"objective": self.objective, "budget_s": BUDGET_S},
         }  # fmt: skip
+        if self.inside_m > 0.0 and barriers:
+            out["no_fly"] = []
+            out["keep_in"] = [
+                {"name": f"area {k}", "polygon": [place(p) for p in a]} for k, a in enumerate(self.areas())
+            ]
         return out | ({} if self.arrival is None else {"arrival": self.arrival})
 
     def write(self, folder: Path) -> Path:
@@ -515,6 +537,14 @@ def bends(rng: np.random.Generator) -> Case:
     return case
 
 
+def insides(rng: np.random.Generator) -> Case:
+    """Keep-in areas that share edges, with walls, slits and yards between them."""
+    case = (walls, slits, bends)[int(rng.integers(0, 3))](rng)
+    case.barriers = [Barrier(b.ring) for b in case.barriers if not b.radius_m]
+    case.family, case.inside_m = "insides", float(rng.choice([120.0, 400.0, 3000.0])) if case.barriers else 0.0
+    return case
+
+
 def denser(ring: Floats) -> Floats:
     """Points along the edges of a ring (N, 2)."""
     part = np.linspace(0.0, 1.0, 20)[:, None, None]
@@ -523,7 +553,7 @@ def denser(ring: Floats) -> Floats:
 
 FAMILIES: dict[str, Callable[[np.random.Generator], Case]] = {
     f.__name__: f for f in (
-        walls, slits, over, climbs, mountains, holes, stops, fleets, wings, returns, frames, bends,
+        walls, slits, over, climbs, mountains, holes, stops, fleets, wings, returns, frames, bends, insides,
     )
 }  # fmt: skip
 

@@ -231,6 +231,8 @@ def attack(seed: int, folder: Path) -> tuple[str, str, list[str]]:
         problems = [p.message for p in why.problems]
     if problems:
         return named, f"refused: {reason(problems[0])}", []
+    if found.zones and all(draft.keep_in for draft in found.zones):  # a world: its holes are what is read
+        parts = [[hole] for part in parts for hole in part[1:]]
     faults: list[str] = []
     refused = 0
     looked = places(rng, parts)

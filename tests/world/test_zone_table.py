@@ -170,7 +170,7 @@ def test_spans_of_a_track_are_where_samples_are_near() -> None:
 
 def test_the_deepest_place_inside_is_that_of_samples() -> None:
     start, end = np.array([70.0, 90.0]), np.array([125.0, 110.0])
-    depth_m, at = deepest_inside(SQUARE, start, end)
+    depth_m, at = deepest_inside(np.stack([SQUARE, np.roll(SQUARE, -1, axis=0)], axis=1), start, end)
     t = np.linspace(0.0, 1.0, 20_001)[:, None]
     places = start + t * (end - start)
     depth = np.minimum(places - 80.0, 120.0 - places).min(axis=1)

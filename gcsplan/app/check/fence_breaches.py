@@ -43,7 +43,8 @@ def fence_for(
     Raises CheckFailed if the mission itself would breach it, with zone and item; InputError if the autopilot cannot
     store or keep it.
     """
-    fence = fence_of(world.airspace.zones, world.frame, mission.autopilot, infinite=infinite, own=own)
+    home = mission.home.lat_e7 * 1e-7, mission.home.lon_e7 * 1e-7
+    fence = fence_of(world.airspace.zones, world.frame, mission.autopilot, infinite=infinite, own=own, home=home)
     try:
         found = breaches_of(fence, mission, vehicle, world, rtl_rel_home_m=rtl_rel_home_m)
     except InputError as error:  # areas_of reads the items as stored, rounded to centimetres

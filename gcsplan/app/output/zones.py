@@ -43,6 +43,8 @@ class ListedZone:
     floor: Level | None
     ceiling: Level | None
     source: str
+    keep_in: bool = False
+    """Whether it is an area to stay in, and no no-fly zone."""
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON: sizes in metres, floor and ceiling under the keys of a mission file."""
@@ -54,7 +56,8 @@ class ListedZone:
         sizes = {"extent_m": self.extent_m, "radius_m": self.radius_m, "buffer_m": self.buffer_m,
                  "length_m": self.length_m}  # fmt: skip
         rounded = {key: np.round(value, 1).tolist() for key, value in sizes.items() if value is not None}
-        return {"name": self.name, "shape": self.shape, "corners": self.corners, **rounded, **levels,
+        kind = {"keep_in": True} if self.keep_in else {}
+        return {"name": self.name, **kind, "shape": self.shape, "corners": self.corners, **rounded, **levels,
                 "source": self.source}  # fmt: skip
 
 
@@ -105,6 +108,7 @@ def _listed(draft: ZoneDraft) -> ListedZone:
     return ListedZone(
         draft.name, shape, (float(east_m), float(north_m)) if whole else None, draft.radius_m, draft.buffer_m,
         length_m if shape == "corridor" and whole else None, len(draft.points), draft.floor, draft.ceiling, draft.where,
+        draft.keep_in,
     )  # fmt: skip
 
 

@@ -37,6 +37,7 @@ from gcsplan.notes.note import Note
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.airspace import Legs, Violation
 from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.zones import Zone
 
 CLEAR, LEGAL, KNOWN = 0, 1, 2
 FIRST_M, FIRST_PARTS = 64.0, 2000
@@ -116,7 +117,8 @@ class _Judge:
         self.trace, self.joins, self.vehicle = trace, joins, vehicle
         limits = vehicle.limits
         free = replace(
-            limits, min_agl_m=0.0, max_agl_m=None, max_amsl_m=None, horizontal_clearance_m=0.0, max_climb_deg=90.0,
+            limits, min_agl_m=0.0, max_agl_m=None, max_amsl_m=None, horizontal_clearance_m=0.0,
+            vertical_clearance_m=0.0, max_climb_deg=90.0,
             max_descent_deg=90.0,
         )  # fmt: skip
         self.limits: tuple[Limits, Limits] = (free, limits)
@@ -288,8 +290,7 @@ class _Judge:
         v, seq = found[0]
         zone = next((names[w.zone] for w, _ in found if w.zone >= 0), "")
         lat, lon = (float(x) for x in self.trace.world.frame.to_degrees(v.east_m, v.north_m))
-        zone_name = names[v.zone] if v.zone >= 0 else ""
-        does = _does(v.kind, zone_name, grade)
+        does = _does(v.kind, self.trace.world.airspace.zones[v.zone] if v.zone >= 0 else None, grade)
         return Note("joining_fails", join=seq, does=does, lat=lat, lon=lon, amsl_m=v.amsl_m), zone
 
 
@@ -304,11 +305,13 @@ WHAT = {
 """The note on a return that breaks a limit, by the kind of the violation."""
 
 
-def _does(kind: str, zone: str, grade: int) -> Note:
+def _does(kind: str, zone: Zone | None, grade: int) -> Note:
     if kind == "coverage":
         return Note("way_over_unknown_ground")
-    if kind == "zone":
-        return Note("way_meets_clearance" if grade == LEGAL else "way_meets_zone", zone=zone)
+    if zone is not None and zone.outside is not None:
+        return Note("way_leaves_keep_in", areas=zone.title)
+    if zone is not None:
+        return Note("way_meets_clearance" if grade == LEGAL else "way_meets_zone", zone=zone.name)
     if grade == CLEAR:
         return Note("way_meets_ground")
     return Note(WHAT[kind]) if kind in WHAT else Note("way_breaks_limit")

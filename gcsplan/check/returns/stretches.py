@@ -16,6 +16,7 @@ from gcsplan.check.returns.trace import MissionTrace
 from gcsplan.check.returns.verdict import UnsafeStretch
 from gcsplan.check.returns.words import both
 from gcsplan.notes.note import Note
+from gcsplan.world.geometry.zones import Zone
 
 ROUND_M = 0.1
 LINE_SAMPLES = 500
@@ -135,7 +136,7 @@ def _reasons(
 ) -> tuple[list[Note], str, Place | None]:
     """The faults of a stretch's returns at the level, worst first; the first zone's name; the place of the ground."""
     hit, kind, over = own.hit(level), own.kind(), own.over()
-    names = [z.name for z in trace.world.airspace.zones]
+    zones = trace.world.airspace.zones
     clauses: list[tuple[tuple[bool, float], Note]] = []
     obstacle = None
     zone = ""
@@ -147,8 +148,8 @@ def _reasons(
             place = _obstacle(trace, float(middle[own.back[row]]), target) if one == GROUND else None
             obstacle = obstacle or place
         if one >= 0:
-            zone = zone or names[one]
-        clauses.append(((math.isinf(over[row]), float(own.top[row])), _why(own, row, names, grade, place)))
+            zone = zone or zones[one].name
+        clauses.append(((math.isinf(over[row]), float(own.top[row])), _why(own, row, zones, grade, place)))
     clauses.sort(key=lambda c: c[0], reverse=True)
     return [does for _, does in clauses], zone, obstacle
 
@@ -163,8 +164,8 @@ def _because(trace: MissionTrace, own: Obstacles, start: float, level: float) ->
     rows = [int(np.flatnonzero(last & (kind == k))[0]) for k in np.unique(kind[last]).tolist() if k not in known]
     if not rows or known:
         return None
-    names = [z.name for z in trace.world.airspace.zones]
-    return Note("at_another_altitude", does=both([_why(own, row, names, CLEAR, None) for row in rows]))
+    zones = trace.world.airspace.zones
+    return Note("at_another_altitude", does=both([_why(own, row, zones, CLEAR, None) for row in rows]))
 
 
 def _obstacle(trace: MissionTrace, u: float, target: Target) -> Place | None:
@@ -179,7 +180,7 @@ def _obstacle(trace: MissionTrace, u: float, target: Target) -> Place | None:
     return lat, lon, float(top[k])
 
 
-def _why(obstacles: Obstacles, row: int, names: Sequence[str], grade: int, obstacle: Place | None) -> Note:
+def _why(obstacles: Obstacles, row: int, zones: Sequence[Zone], grade: int, obstacle: Place | None) -> Note:
     """The note on a return that hits an obstacle."""
     what, top, bottom = int(obstacles.what[row]), float(obstacles.top[row]), float(obstacles.bottom[row])
     if what == MAX_AMSL:
@@ -203,7 +204,9 @@ def _why(obstacles: Obstacles, row: int, names: Sequence[str], grade: int, obsta
     height = None
     if math.isinf(top):
         height = Note("zone_without_top") if math.isinf(bottom) else Note("zone_from", bottom_m=bottom)
-    return Note("does_meet_zone", zone=names[what], height=height)
+    if zones[what].outside is not None:
+        return Note("does_leave_keep_in", areas=zones[what].title, height=height)
+    return Note("does_meet_zone", zone=zones[what].name, height=height)
 
 
 def without_doubles(found: list[UnsafeStretch]) -> tuple[UnsafeStretch, ...]:

@@ -83,10 +83,15 @@ def check(
     ] = None,
     on_bad: OnBadOption = None,
     ignore: IgnoreOption = None,
+    keep_in: Annotated[
+        list[str] | None,
+        typer.Option(metavar="FILE", help="Areas to stay in: a file as for --zones, or a .plan with a fence."),
+    ] = None,
     min_agl: Annotated[Number, typer.Option(metavar="M", help="Lowest height above ground.")] = None,
     max_agl: Annotated[Number, typer.Option(metavar="M", help="Highest height above ground.")] = None,
     max_amsl: Annotated[Number, typer.Option(metavar="M", help="Highest altitude above sea level.")] = None,
     clearance: Annotated[Number, typer.Option(metavar="M", help="From zones and rising ground [default: 30]")] = None,
+    vertical_clearance: Annotated[Number, typer.Option(metavar="M", help="Over and under zones [default: 0]")] = None,
     track_error: Annotated[Number, typer.Option(metavar="M", help="How far off track it may be [default: 3]")] = None,
     altitude_error: Annotated[Number, typer.Option(metavar="M", help="Likewise in height [default: 5]")] = None,
     max_climb: Annotated[Number, typer.Option(metavar="DEG", help="Steepest climb.")] = None,
@@ -159,7 +164,7 @@ def check(
         from gcsplan.cli.commands.zones import show_zones
 
         named = [Path(f) for f in files if Path(f).suffix.lower() not in (".waypoints", ".plan")]
-        named += [Path(f) for f in zones or []]
+        named += [Path(f) for f in (*(zones or []), *(keep_in or []))]
         if not named:  # a fence may be in one
             named = [Path(f) for f in files if Path(f).suffix.lower() == ".waypoints"]
         if not named:
@@ -168,9 +173,9 @@ def check(
         return show_zones(named, units_of(units), as_json=as_json, at=at, on_bad=rule, ignore=ignored)
     given: dict[str, object] = {
         "--dem": dem, **as_options(terrain_keys(vertical_datum, height_unit, nodata)), "--geoid-grid": geoid_grid,
-        "--crs": crs, "--obstacle-height": obstacle_height, "--zones": zones, "--on-bad": on_bad,
-        "--ignore": ignore, "--min-agl": min_agl,
-        "--max-agl": max_agl, "--max-amsl": max_amsl, "--clearance": clearance, "--track-error": track_error,
+        "--crs": crs, "--obstacle-height": obstacle_height, "--zones": zones, "--keep-in": keep_in,
+        "--on-bad": on_bad, "--ignore": ignore, "--min-agl": min_agl, "--max-agl": max_agl, "--max-amsl": max_amsl,
+        "--clearance": clearance, "--vertical-clearance": vertical_clearance, "--track-error": track_error,
         "--altitude-error": altitude_error, "--max-climb": max_climb, "--max-descent": max_descent,
         "--autopilot": autopilot, "--home": home, "--speed": speed, "--climb-rate": climb_rate,
         "--descent-rate": descent_rate, "--rtl-altitude": rtl_altitude, "--return-route": return_route,
@@ -278,16 +283,22 @@ def world_options(given: dict[str, object], at: str | None = None) -> WorldOptio
     def under(*keys: str) -> dict[str, object]:
         return {key: given[KEY_OPTIONS[key]] for key in keys if KEY_OPTIONS[key] in given}
 
-    limits = ("min_agl_m", "max_agl_m", "max_amsl_m", "horizontal_clearance_m", "track_error_m", "altitude_error_m",
+    limits = ("min_agl_m", "max_agl_m", "max_amsl_m", "horizontal_clearance_m", "vertical_clearance_m",
+              "track_error_m", "altitude_error_m",
               "max_climb_deg", "max_descent_deg")  # fmt: skip
     vehicle = under("climb_m_s", "descent_m_s")
     if isinstance(speed := given.get("--speed"), float):
         vehicle["speed_m_s"] = [min(speed, 3.0), speed]
-    zones, rtl, route = given.get("--zones"), given.get("--rtl-altitude"), given.get("--return-route")
+    rtl, route = given.get("--rtl-altitude"), given.get("--return-route")
+    zones, keep_in = (
+        tuple(str(name) for name in names) if isinstance(names, list) else ()
+        for names in (given.get("--zones"), given.get("--keep-in"))
+    )
     home = _home(str(given["--home"])) if "--home" in given else None
     return WorldOptions(
         terrain=under("dem", "vertical_datum", "height_unit", "nodata", "geoid_grid", "crs", "obstacle_height_m"),
-        zones=tuple(str(z) for z in zones) if isinstance(zones, list) else (),
+        zones=zones,
+        keep_in=keep_in,
         limits={k: float(str(v)) for k, v in under(*limits).items()},
         vehicle=vehicle,
         home=None if home is None else (home.lat_deg, home.lon_deg),

@@ -38,7 +38,7 @@ def show_zones(
         levels = _level(zone.floor, "ground", units), _level(zone.ceiling, "none", units)
         table.add_row(
             escape(printable(zone.name)),
-            zone.shape,
+            f"{zone.shape}, keep-in" if zone.keep_in else zone.shape,
             _size(zone, units),
             *levels,
             escape(printable(_short(zone.source))),

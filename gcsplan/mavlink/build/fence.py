@@ -1,9 +1,14 @@
-"""No-fly zones as the items of a MAVLink fence, and back.
+"""No-fly zones and keep-in areas as the items of a MAVLink fence, and back.
 
 A fence item is a circle or one corner of a polygon and has **no height**, so it cannot express a zone with a floor or a
 ceiling. Such a zone is left out, or on request becomes a fence from the ground to the sky. A circle's radius is rounded
 up to whole centimetres; the polygon of the fence deviates from a zone's outline by at most `FENCE_STRAIGHT_M`. Items
 are in frame 0: ArduPilot refuses frame 2, and no autopilot stores the altitude.
+
+Of keep-in areas one inclusion polygon is made, and an exclusion polygon for each hole in it: autopilots differ in what
+several inclusion areas mean, and a flight cannot leave the piece in which its home is. It holds the areas whatever
+their heights, drawn larger by `FENCE_GROWN_M`, or by as much as its corners must be fewer: it only guards what was
+proved.
 """
 
 from __future__ import annotations
@@ -24,13 +29,19 @@ from gcsplan.mavlink.mission.mission import FENCE, GLOBAL, MissionItem, degrees_
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot
 from gcsplan.world.geodesy.degree_shapes import LARGEST_RADIUS_M, near_circle, near_polygons, outline_of, unwrapped
-from gcsplan.world.geometry.zones import Circle, Polygon, Zone
+from gcsplan.world.geometry.outlines import WIDER_M, few_corners
+from gcsplan.world.geometry.zones import Circle, KeepIn, Polygon, Zone, keep_in_of, no_fly_of
 
 if TYPE_CHECKING:
+    import shapely
+
     from gcsplan.world.geodesy.frame import Frame
 
 FENCE_STRAIGHT_M = 0.1
 """Metres: a corner of the outline that lies within this of the line between its kept neighbours is left out."""
+
+FENCE_GROWN_M = 0.2
+"""Metres by which keep-in areas are drawn larger, more than rounding takes off."""
 
 MOST_FENCE_CORNERS = 255  # of one polygon on ArduPilot, which stores the number in a byte (AC_PolyFence_loader.cpp)
 STORAGE_BYTES = {Autopilot.ARDUCOPTER: 560, Autopilot.ARDUPLANE: 672}  # StorageManager.cpp, StorageFence
@@ -64,20 +75,19 @@ class Fence:
 
 
 def fence_of(
-    zones: Sequence[Zone],
-    frame: Frame,
-    autopilot: Autopilot,
-    *,
-    infinite: bool = False,
-    own: Sequence[MissionItem] = (),
-) -> Fence:
-    """Return the fence that keeps an aircraft out of ``zones``, and all of ``own``, a file's own fence.
+    zones: Sequence[Zone], frame: Frame, autopilot: Autopilot, *, infinite: bool = False,
+    own: Sequence[MissionItem] = (), home: tuple[float, float] | None = None,
+) -> Fence:  # fmt: skip
+    """Return the fence that keeps an aircraft out of ``zones`` and in the piece of keep-in areas around ``home``, and
+    all of ``own``, a file's own fence.
 
-    Zones with a floor or a ceiling are left out and named; with ``infinite`` they are included without floor and
-    ceiling. A circle inside another one is dropped, and so is an area of ``own`` that is a zone's already. Raises
-    InputError if the autopilot cannot store the fence, or ``own`` has parts that are not whole.
+    ``home``: latitude and longitude; None: the frame's origin. Zones with a floor or a ceiling are left out and named;
+    with ``infinite`` they are included without floor and ceiling. A circle inside another one is dropped, and so is an
+    area of ``own`` that is a zone's already. Raises InputError if the autopilot cannot store the fence, or ``own`` has
+    parts that are not whole.
     """
     notes: list[Note] = []
+    areas, zones = keep_in_of(zones), no_fly_of(zones)
     bounded = [z for z in zones if z.floor is not None or z.ceiling is not None]
     taken = list(zones) if infinite else [z for z in zones if z.floor is None and z.ceiling is None]
     if bounded and infinite:
@@ -89,6 +99,11 @@ def fence_of(
         notes.append(Note("fence_circles_inside", names=_names(inside)))
     taken = [z for z in taken if z not in inside]
     parts = [tuple(_circle(z.shape, frame) if isinstance(z.shape, Circle) else _corners(z, frame)) for z in taken]
+    if areas:
+        origin = (0.0, 0.0) if home is None else tuple(frame.to_plane(*home).tolist())
+        outline, *holes = _kept_in(areas, origin, _corners_left([*parts, *parts_of(own)], autopilot), notes)
+        parts += [tuple(_corners(outline, frame, POLYGON_IN)), *(tuple(_corners(hole, frame)) for hole in holes)]
+        taken += [outline, *holes]
     known = {tuple(map(_wire, part)) for part in parts}
     more = [part for part in parts_of(own) if tuple(map(_wire, part)) not in known]
     names = [f"the zone {z.name!r}" for z in taken] + [f"the file's own area {k}" for k in range(1, len(more) + 1)]
@@ -177,13 +192,53 @@ def _circle(circle: Circle, frame: Frame) -> list[MissionItem]:
     return [MissionItem(CIRCLE_OUT, GLOBAL, (radius_m, 0.0, 0.0, 0.0), degrees_e7(lat), degrees_e7(lon))]
 
 
-def _corners(zone: Zone, frame: Frame) -> list[MissionItem]:
+def _kept_in(
+    areas: Sequence[KeepIn], home: tuple[float, ...], most_corners: int, notes: list[Note]
+) -> list[Zone]:  # fmt: skip
+    """The outline around the piece of keep-in areas that is nearest to ``home`` (east_m, north_m), and its holes."""
+    import shapely
+
+    names = tuple(repr(area.name) for area in areas)
+    shapes = [part.shape() for area in areas for part in area.parts]
+    if not shapes:
+        raise InputError(f"the keep-in areas {', '.join(names)} are far from the mission: no fence is made of them")
+    grown = shapely.buffer(shapely.union_all(shapes), FENCE_GROWN_M, join_style="mitre")
+    pieces = list(shapely.get_parts(grown))
+    piece = min(pieces, key=lambda p: float(p.distance(shapely.Point(home))))
+    if len(pieces) > 1:
+        notes.append(Note("fence_of_one_piece", count=len(pieces)))
+    if any(area.floor is not None or area.ceiling is not None for area in areas):
+        notes.append(Note("fence_areas_without_heights", names=names))
+    title = "keep-in areas" if len(areas) > 1 else areas[0].name
+    outline = _open_ring(piece.exterior)
+    few = few_corners(outline, max(most_corners, 3), outward=True)
+    if few is not None and len(few) < len(outline):
+        notes.append(Note("fence_area_wider", given=len(outline), corners=len(few), wider_m=WIDER_M[-1]))
+    found = [Zone(title, Polygon(outline if few is None else few))]
+    return found + [Zone(f"hole in {title}", Polygon(_open_ring(hole))) for hole in piece.interiors]
+
+
+def _open_ring(ring: shapely.LinearRing) -> Floats:
+    """Its corners, counter-clockwise, not closed."""
+    corners = np.asarray(ring.coords)[:-1]
+    return np.ascontiguousarray(corners if ring.is_ccw else corners[::-1])
+
+
+def _corners_left(parts: Sequence[Sequence[MissionItem]], autopilot: Autopilot) -> int:
+    """How many corners one more polygon may have for the autopilot to store it beside other areas."""
+    left = max_items(autopilot, FENCE) - sum(map(len, parts))
+    if (storage := STORAGE_BYTES.get(autopilot)) is not None:
+        left = min(left, MOST_FENCE_CORNERS, (storage - _bytes_of(parts) - POLYGON_BYTES) // CORNER_BYTES)
+    return left
+
+
+def _corners(zone: Zone, frame: Frame, command: int = POLYGON_OUT) -> list[MissionItem]:
     assert isinstance(zone.shape, Polygon)
     ring = _straightened(zone.shape.vertices)
     places = frame.to_degrees(ring[:, 0], ring[:, 1])
     count = float(len(ring))
     return [
-        MissionItem(POLYGON_OUT, GLOBAL, (count, 0.0, 0.0, 0.0), degrees_e7(lat), degrees_e7(lon))
+        MissionItem(command, GLOBAL, (count, 0.0, 0.0, 0.0), degrees_e7(lat), degrees_e7(lon))
         for lat, lon in places.tolist()
     ]
 
@@ -228,10 +283,16 @@ def require_storage(parts: Sequence[Sequence[MissionItem]], autopilot: Autopilot
     if len(items) > most:
         raise InputError(f"the fence has {counted(len(items), 'item')} ({what}) and {label} keeps {most}: {cure}")
     storage = STORAGE_BYTES.get(autopilot)
-    needed = HEAD_BYTES + CIRCLE_BYTES * circles + POLYGON_BYTES * polygons + CORNER_BYTES * corners
-    if storage is not None and needed > storage:
+    if storage is not None and _bytes_of(parts) > storage:
         fits = (storage - HEAD_BYTES) // CIRCLE_BYTES
         raise InputError(f"the fence of {what} does not fit: {label} has room for {fits} circles, or so: {cure}")
+
+
+def _bytes_of(parts: Sequence[Sequence[MissionItem]]) -> int:
+    """The bytes that a fence takes in ArduPilot's storage."""
+    circles = sum(part[0].command in (CIRCLE_IN, CIRCLE_OUT) for part in parts)
+    polygons, corners = len(parts) - circles, sum(map(len, parts)) - circles
+    return HEAD_BYTES + CIRCLE_BYTES * circles + POLYGON_BYTES * polygons + CORNER_BYTES * corners
 
 
 def _holds(outer: Zone, inner: Zone, first: bool) -> bool:

@@ -136,6 +136,8 @@ class LimitKeys(Keys):
     """Greatest altitude above sea level."""
     horizontal_clearance_m: Length | None = None
     """Least distance to every zone, and to ground that reaches flight level."""
+    vertical_clearance_m: Length | None = None
+    """Least height over the ceiling and under the floor of every zone; if absent, 0."""
     track_error_m: Length | None = None
     """Largest distance of the aircraft from its track; every check is widened by it."""
     altitude_error_m: Length | None = None
@@ -147,7 +149,7 @@ class LimitKeys(Keys):
 
 
 class ZoneKeys(Keys):
-    """One entry of ``no_fly:``: a circle, a polygon, a line or a file."""
+    """One entry of ``no_fly:`` or ``keep_in:``: a circle, a polygon, a line (of ``no_fly``) or a file."""
 
     name: Text | None = None
     """Name of the zone in messages and reports."""
@@ -358,6 +360,8 @@ class MissionKeys(Keys):
     """Limits of every vehicle; a vehicle may override any of them."""
     no_fly: list[ZoneKeys] = []
     """Zones that no vehicle enters."""
+    keep_in: list[ZoneKeys] = []
+    """Areas, from floor to ceiling, whose union every flight stays in with all its errors."""
     at: Text | Annotated[list[Text], Field(min_length=2, max_length=2)] | None = None
     """When it is flown: a time, a day, or [from, to]; published zones that do not apply then are left out."""
     vehicles: Annotated[list[VehicleKeys], Field(min_length=1, max_length=255)]

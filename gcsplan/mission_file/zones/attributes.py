@@ -41,6 +41,8 @@ BOUNDS = {
 UNIT_NAMES = ("unit", "units", "uom")
 REFERENCE_NAMES = ("reference", "ref", "datum", "code")
 
+KEEP_IN = "keep_in"
+
 ATTRIBUTES_UNREAD = Note("zone_attributes_unread")
 TIMES_UNREAD = Note("zone_times_unread")
 UNDER_PRESSURE = Note("zone_floor_at_flight_level")
@@ -132,6 +134,8 @@ class ZoneStatements:
     buffer_m: float | None = None
     unread: tuple[Mistake, ...] = ()
     """Mistakes in its floor and ceiling, which are then missing."""
+    keep_in: bool = False
+    """Whether it is an area to stay in: gcsplan's own files say so, by ``kind``."""
 
 
 def read_attributes(
@@ -169,9 +173,10 @@ def read_attributes(
             reading.remarks.append((note, (*map(str, some[:MOST_ATTRIBUTES_SHOWN]), *more)))
     if len(problems) > before:
         return None
+    inside = any(a.meaning.lower == "kind" and a.value == KEEP_IN for a in given)
     return ZoneStatements(
         own_name, radius_m, Bounds() if unread else bounds, tuple(reading.remarks), reading.of_levels, buffer_m,
-        tuple(unread),
+        tuple(unread), inside,
     )  # fmt: skip
 
 

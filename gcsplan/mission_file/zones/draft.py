@@ -75,6 +75,8 @@ class ZoneDraft:
     it then counts from the ground up without end. ``great_circles``: its format does not say that edges are
     straight in degrees, so that what they enclose along great circles belongs to the zone, too. ``doubt`` is where a
     polygon that is read as across the antimeridian lies if it goes around the other side: a mission there is refused.
+    ``keep_in``: it is no zone, but an area that flights stay in, without its ``holes``; a zone's holes count as no-fly.
+    ``kept_by`` is the statement that it is one: flights stay in the union of the areas of one statement.
     """
 
     name: str
@@ -91,6 +93,9 @@ class ZoneDraft:
     unread: tuple[Mistake, ...] = ()
     great_circles: bool = False
     doubt: tuple[tuple[float, float], ...] = ()
+    keep_in: bool = False
+    kept_by: str = ""
+    holes: tuple[tuple[tuple[float, float], ...], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,7 +163,7 @@ def circle(
 
 def polygon(
     name: str, where: str, points: Sequence[tuple[float, float]], bounds: Bounds, problems: list[Mistake],
-    *, local: bool = False, key: str = "polygon", holes: int = 0,
+    *, local: bool = False, key: str = "polygon", holes: Sequence[Sequence[tuple[float, float]]] = (),
 ) -> ZoneDraft | None:  # fmt: skip
     """A prism; None, and new ``problems``, if its outline is not simple or its bounds contradict each other."""
     before = len(problems)
@@ -167,8 +172,8 @@ def polygon(
     floor, ceiling = bounds.levels(where, problems)
     if len(problems) > before:
         return None
-    points, doubt = (points, ()) if local else across(points, holes)
-    if not local and (wide := wide_fault(points, holes)):
+    points, doubt = (points, ()) if local else across(points, len(holes))
+    if not local and (wide := wide_fault(points, len(holes))):
         problems.append(Mistake(at, f"zone {name[:60]!r}: {wide}"))
         return None
     ring, fault = outline_of(points, local=local)
@@ -176,7 +181,8 @@ def polygon(
         problems.append(Mistake(at, fault))
         return None
     remarks = ((ACROSS_ANTIMERIDIAN, None),) if doubt else ()
-    return ZoneDraft(name, where, tuple(ring), local, None, floor, ceiling, remarks=remarks, doubt=doubt)
+    inner = tuple(tuple(hole) for hole in holes)
+    return ZoneDraft(name, where, tuple(ring), local, None, floor, ceiling, remarks=remarks, doubt=doubt, holes=inner)
 
 
 def corridor(
@@ -358,6 +364,9 @@ def zones_sha256(drafts: Sequence[ZoneDraft]) -> str:
         plain = [d.name, len(d.points), d.local, d.radius_m, d.buffer_m, d.floor and str(d.floor)]
         found.update(json.dumps([*plain, d.ceiling and str(d.ceiling)]).encode())
         found.update(np.array(d.points, "<f8").tobytes())
+        for hole in d.holes if d.keep_in else ():
+            found.update(np.array(hole, "<f8").tobytes())
+        found.update(b"keep_in" * d.keep_in)
     return found.hexdigest()
 
 

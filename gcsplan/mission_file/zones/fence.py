@@ -161,15 +161,8 @@ def _returns(found: ZoneFile, count: int) -> None:
 def _add(
     found: ZoneFile, name: str, where: str, corners: list[Corner], *, inside: bool, radius_m: float | None = None
 ) -> None:
-    """Add an area; one that the aircraft stays ``inside`` is no zone."""
-    if inside:
-        words = (
-            f"{name[:60]!r} keeps the aircraft in: it is a keep-in area, outside of which all is no-fly, and gcsplan "
-            "has none yet; draw what may not be flown near the mission as exclusion areas"
-        )
-        found.problems.append(Mistake(where, words))
-        return
-    stated = ZoneStatements(name, radius_m, Bounds(), (), False)
+    """Add an area; one that the aircraft stays ``inside`` is a keep-in area."""
+    stated = ZoneStatements(name, radius_m, Bounds(), (), False, keep_in=inside)
     if radius_m is None:
         found.add_ring(stated, name, where, corners, "")
     else:

@@ -2,7 +2,8 @@
 
 Polygons are prisms, points with ``radius_m`` are cylinders, lines with ``buffer_m`` corridors; the mission may give
 both sizes for all shapes of a file that have none of their own, or ignore these. Floors and ceilings are in a feature's
-properties, or in a Placemark's ExtendedData (`read_attributes`). A hole counts as no-fly.
+properties, or in a Placemark's ExtendedData (`read_attributes`). A hole counts as no-fly, but
+for the holes of a polygon around the world: they are keep-in areas.
 
 A zone that is left out would be flown through. So what cannot be understood is collected, with its place, and
 `ZoneFile.settle` is the one place that decides by the mission's ``on_bad`` what it does: it refuses the file, or the
@@ -19,9 +20,9 @@ from typing import Literal
 
 from gcsplan.errors import InputError, Mistake
 from gcsplan.mission_file.zones.attributes import ZoneStatements
-from gcsplan.mission_file.zones.draft import Remark, ZoneDraft, circle, corridor, one_line, polygon
+from gcsplan.mission_file.zones.draft import Bounds, Remark, ZoneDraft, circle, corridor, one_line, polygon
 from gcsplan.notes.note import Note
-from gcsplan.world.geodesy.degree_shapes import Corner
+from gcsplan.world.geodesy.degree_shapes import Corner, is_world
 from gcsplan.world.geometry.zones import Level
 
 MAX_ZONES = 20_000
@@ -185,10 +186,16 @@ class ZoneFile:
 
     def add_ring(
         self, stated: ZoneStatements, part: str, where: str, ring: list[tuple[float, float]], key: str,
-        drawn: Drawn = NOT_DRAWN, holes: int = 0,
+        drawn: Drawn = NOT_DRAWN, holes: Sequence[Sequence[Corner]] = (),
     ) -> None:  # fmt: skip
-        """Add a polygon called ``part`` by its outline, (latitude, longitude), and the number of its holes."""
-        self.holes += holes
+        """Add a polygon called ``part`` by its outline, (latitude, longitude), and its holes.
+
+        The holes of a world are keep-in areas; otherwise they count as no-fly.
+        """
+        if holes and is_world(ring):
+            self._add_holes_of_world(stated, part, where, key, holes)
+            return
+        self.holes += 0 if stated.keep_in else len(holes)
         bounds = stated.bounds
         remarks = [*stated.remarks, *drawn.remarks]
         if drawn.ceiling is not None:
@@ -197,7 +204,23 @@ class ZoneFile:
             if size_m is not None:
                 remarks.append((note, Note("size_of_zone", size_m=size_m)))
         draft = polygon(part[:200], where, ring, bounds, self.problems, key=key, holes=holes)
-        self.add(None if draft is None else replace(draft, unread=stated.unread), remarks)
+        self.add(None if draft is None else self._stated(draft, stated), remarks)
+
+    def _stated(self, draft: ZoneDraft, stated: ZoneStatements) -> ZoneDraft:
+        """The draft with what its attributes say of it besides its shape."""
+        return replace(draft, unread=stated.unread, keep_in=stated.keep_in, kept_by=str(self.path))
+
+    def _add_holes_of_world(
+        self, stated: ZoneStatements, part: str, where: str, key: str, holes: Sequence[Sequence[Corner]]
+    ) -> None:
+        """Add the holes of a polygon around the world: outside of them all is no-fly, so that flights stay inside."""
+        if stated.bounds != Bounds() or stated.unread:
+            words = "a polygon around the world is no-fly at all heights outside of its holes: leave its levels out"
+            self.problems.append(Mistake(where, words))
+        for i, hole in enumerate(holes):
+            name = part if len(holes) == 1 else f"{part}/{i + 1}"
+            draft = polygon(name[:200], where, hole, Bounds(), self.problems, key=key)
+            self.add(draft and replace(draft, keep_in=True, kept_by=f"{part} of {where}"), stated.remarks)
 
     def add_circle(
         self, stated: ZoneStatements, part: str, where: str, centre: Corner, remarks: Sequence[Remark] = ()
@@ -225,7 +248,7 @@ class ZoneFile:
     ) -> None:  # fmt: skip
         def whole(size_m: float) -> ZoneDraft | None:
             draft = make(size_m)
-            return None if draft is None else replace(draft, unread=stated.unread)
+            return None if draft is None else self._stated(draft, stated)
 
         remarks = [*stated.remarks, *remarks]
         if size_m is not None:

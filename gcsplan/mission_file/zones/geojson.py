@@ -162,11 +162,13 @@ def _rings(found: ZoneFile, rings: Any, stated: ZoneStatements, part: str, where
         return
     outline = _positions(found, rings[0], f"{at}[0]")
     holes = [_positions(found, ring, f"{at}[{k}]") for k, ring in enumerate(rings[1:], 1) if isinstance(ring, list)]
-    if outline is not None and (odd := beyond_outline(outline, [hole for hole in holes if hole])):
+    if len(holes) < len(rings) - 1:
+        found.problems.append(Mistake(at, "a ring of a polygon is a list of positions, given something else"))
+    elif outline is not None and (odd := beyond_outline(outline, [hole for hole in holes if hole])):
         found.problems.append(Mistake(at, f"zone {part[:60]!r}: {odd}"))
     elif outline is not None:
         found.add_ring(stated, part, where, outline, at.removeprefix(where).removeprefix("."), _unread(rings[0]),
-                       holes=len(rings) - 1)  # fmt: skip
+                       holes=[hole for hole in holes if hole])  # fmt: skip
 
 
 def _line(found: ZoneFile, positions: Any, stated: ZoneStatements, part: str, where: str, at: str) -> None:

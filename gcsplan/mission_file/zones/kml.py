@@ -159,12 +159,13 @@ def _polygon(found: ZoneFile, shape: Any, stated: ZoneStatements, part: str, whe
     points = _coordinates(found, outer[0], where)
     inner = [e for e in _walk(shape, found.path) if _kind(e) == "innerBoundaryIs"]
     rings = [_coordinates(found, e, where) for e in inner]
-    odd = beyond_outline([p[:2] for p in points or []], [[p[:2] for p in ring] for ring in rings if ring])
+    holes = [[p[:2] for p in ring] for ring in rings if ring]
+    odd = beyond_outline([p[:2] for p in points or []], holes)
     if odd:
         found.problems.append(Mistake(where, odd))
     elif points is not None:
         drawn = _unread(points) if stated.of_levels else _drawn(shape, points)
-        found.add_ring(stated, part, where, [p[:2] for p in points], "", drawn, len(inner))
+        found.add_ring(stated, part, where, [p[:2] for p in points], "", drawn, holes)
 
 
 def _drawn(shape: Any, points: list[DrawnCorner]) -> Drawn:

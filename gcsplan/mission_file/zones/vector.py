@@ -213,16 +213,18 @@ def _feature(
         xy = np.asarray(outline.coords)[:, :2]
         try:
             is_keep_in = shape.geom_type == "Polygon" and bool(shape.interiors)  # if it is wide, and then by that name
-            drawn_deg = to_degrees.line(xy, MAX_VERTICES, any_width=is_keep_in)
-            corners = [(float(lat), float(lon)) for lat, lon in drawn_deg]
+            rings = [np.asarray(ring.coords)[:, :2] for ring in getattr(shape, "interiors", ())]
+            corners, *holes = (
+                [(float(lat), float(lon)) for lat, lon in to_degrees.line(ring, MAX_VERTICES, any_width=is_keep_in)]
+                for ring in (xy, *rings)
+            )
         except InputError as why:
             found.problems.append(Mistake(where, f"zone {stated.name[:60]!r}: {why.message}"))
             continue
-        rings = [np.asarray(ring.coords)[:, :2] for ring in getattr(shape, "interiors", ())]
         if odd := beyond_outline(xy.tolist(), [ring.tolist() for ring in rings], metres=True):
             found.problems.append(Mistake(where, f"zone {stated.name[:60]!r}: {odd}"))
         elif shape.geom_type == "Polygon":
-            found.add_ring(stated, part, where, corners, "", drawn, len(shape.interiors))
+            found.add_ring(stated, part, where, corners, "", drawn, holes)
         elif shape.geom_type == "Point":
             found.add_circle(stated, part, where, corners[0], drawn.remarks)
         else:

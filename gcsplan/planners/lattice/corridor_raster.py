@@ -227,7 +227,7 @@ def _passed(
 
     Return False and change nothing if the zone can be passed neither over nor under: it is a wall.
     """
-    error = problem.limits.altitude_error_m
+    error = problem.limits.over_zone_m
     capacity = []
     for upper, level in ((True, zone.ceiling), (False, zone.floor)):
         if level is None or over is (not upper):
@@ -257,9 +257,9 @@ def _level(problem: Problem, level: Level, upper: bool, east: Floats, north: Flo
     limits, air = problem.limits, problem.airspace
     if upper:
         wide = replace(limits, min_agl_m=0.0)
-        return air.floor_amsl(east, north, wide) + level.value_m
+        return air.floor_amsl(east, north, wide) + (level.value_m + limits.vertical_clearance_m)
     wide = Limits(
         0.0, max_agl_m=level.value_m, track_error_m=limits.track_error_m + limits.horizontal_clearance_m,
-        altitude_error_m=limits.altitude_error_m,
+        altitude_error_m=limits.over_zone_m,
     )  # fmt: skip
     return air.ceiling_amsl(east, north, wide)

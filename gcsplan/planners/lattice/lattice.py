@@ -144,7 +144,7 @@ def _edge_bands(
         edges.append((j[hit] * nx + i[hit]) * 8 + k[hit])
         zones.append(np.full(len(hit), zone))
     edge, of = np.concatenate(edges), np.concatenate(zones)
-    (low, high), agl = table.levels_m(limits.altitude_error_m), table.over_ground
+    (low, high), agl = table.levels_m(limits.over_zone_m), table.over_ground
     row, col = np.divmod(edge // 8, nx)
     order = np.lexsort((low[of] + agl[of, 0] * ground[2 * row, 2 * col], edge))
     of = of[order]
@@ -183,7 +183,7 @@ def make_links(problem: Problem, lattice: Lattice, place: tuple[float, float], a
     low = np.asarray(air.floor_amsl(at[..., 0], at[..., 1], limits))
     high = np.asarray(air.ceiling_amsl(at[..., 0], at[..., 1], limits))
     bands: list[list[tuple[Floats, Floats]]] = [[] for _ in node]
-    bottom, top = table.levels_m(limits.altitude_error_m)
+    bottom, top = table.levels_m(limits.over_zone_m)
     follows = bool(table.follow_ground.any())
     ground = _known(air.surface.ground_at(at[..., 0], at[..., 1]), 0.0) if follows else np.zeros(at.shape[:2])
     for zone in table.within((*place, *place), lattice.reach_m + 3.0 * lattice.step_m):

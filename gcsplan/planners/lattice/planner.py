@@ -121,7 +121,7 @@ def _not_found(problem: Problem, router: Router | None) -> Refusal:
 
 def _stopped_by(problem: Problem, why: Obstruction) -> str:
     if why.kind == "zone":
-        return f"no-fly zone {problem.airspace.zones[why.zone].name!r}"
+        return problem.airspace.zones[why.zone].title
     if why.kind == "pinched":
         return f"ground that comes too near to the ceiling, by {why.by:.1f} m"
     run_m = why.s1_m - why.s0_m

@@ -64,7 +64,7 @@ class ZoneLevels:
             whole = values_at(s, band.s_m, tubes, k == 1)
             here = whole
             if level is not None and level.datum == "agl":
-                here = _filled(s, ground[k]) + level.value_m + spare_m * (problem.limits.altitude_error_m + SPARE_M)
+                here = _filled(s, ground[k]) + level.value_m + spare_m * (problem.limits.over_zone_m + SPARE_M)
                 here = np.minimum(here, whole) if k == 1 else np.maximum(here, whole)
             most.append(np.stack([whole[:-1], whole[1:]], axis=-1))
             found.append(np.stack([here[:-1], here[1:]], axis=-1))

@@ -120,10 +120,15 @@ def _require_legal(problem: Problem, name: str, place: tuple[float, float], amsl
     if amsl is None:
         shut = _shut_by(problem, place, low, high)
     if shut:
-        raise refuse(
-            f"{name} lies in no-fly zone {shut[0].name!r} or within {reach:.1f} m of it "
-            f"(horizontal_clearance_m + track_error_m): move {name}, or shrink the zone"
+        where, cure = (
+            (f"in {shut[0].title} or within {reach:.1f} m of it", "shrink the zone")
+            if shut[0].outside is None
+            else (f"outside of {shut[0].title} or within {reach:.1f} m of the edge", "draw it larger")
         )
+        if shut[0].outside is not None and not (shut[0].floor is None and shut[0].ceiling is None):
+            where = f"{limits.over_zone_m:g} m or less below the ceiling, or above the floor, of {shut[0].title}"
+            raise refuse(f"{name} lies {where} (altitude_error_m + vertical_clearance_m): {cure}, or lower the limits")
+        raise refuse(f"{name} lies {where} (horizontal_clearance_m + track_error_m): move {name}, or {cure}")
 
 
 def _proved(problem: Problem, place: tuple[float, float], amsl: float | None) -> bool:
@@ -163,7 +168,7 @@ def _shut_by(problem: Problem, place: tuple[float, float], low: float, high: flo
     ground count only inside their shape: beside it, ground elsewhere decides."""
     air, limits, here = problem.airspace, problem.limits, np.array([place])
     table = air.zone_table
-    bottoms, tops = table.levels_m(limits.altitude_error_m, float(air.surface.ground_at(*place)))
+    bottoms, tops = table.levels_m(limits.over_zone_m, float(air.surface.ground_at(*place)))
     # Over unknown ground, a zone's floor or ceiling AGL cannot be evaluated, so the zone has no open side there.
     bottoms, tops = np.where(np.isnan(bottoms), -math.inf, bottoms), np.where(np.isnan(tops), math.inf, tops)
     return [

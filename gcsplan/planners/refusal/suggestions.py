@@ -23,7 +23,7 @@ from gcsplan.planners.profile.track import denser
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.geometry.limits import Limits
 from gcsplan.world.geometry.path import runs_m
-from gcsplan.world.geometry.zones import Circle, Zone
+from gcsplan.world.geometry.zones import Circle, Zone, keep_in_of, no_fly_of
 
 MOST_TRIALS = 32
 """Most plans of changed problems."""
@@ -303,6 +303,9 @@ class Cure:
     whole: bool = False
 
 
+NO_FLY = "the no-fly zones"
+
+
 @dataclass(frozen=True, slots=True)
 class Lift:
     """A limit, or all zones: whether it ``binds`` in a problem at all, the problem without it, the cure to report."""
@@ -403,7 +406,7 @@ def _fewer_zones(trials: Trials, path: Floats) -> Cure:
     all of them."""
     problem, zones = trials.problem, trials.problem.airspace.zones
     broken = problem.airspace.examine(Legs.of_path(path, problem.limits), problem.limits).violations
-    crossed = sorted({v.zone for v in broken if v.zone >= 0})
+    crossed = sorted({v.zone for v in broken if v.zone >= 0 and zones[v.zone].outside is None})
     alone = []
     for k in crossed[:SINGLES]:
         if trials.spent:
@@ -421,9 +424,20 @@ def _fewer_zones(trials: Trials, path: Floats) -> Cure:
     if crossed and kept and not trials.spent and trials.path(_zoned(problem, kept), "without several zones") is None:
         crossed = []
     if not crossed:
-        return Cure("without the no-fly zones there is a path")
+        return Cure(f"without {NO_FLY} there is a path")
     words = _list([repr(zones[k].name) for k in crossed])
     return Cure(f"without the no-fly zones {words} together there is a path", *at)
+
+
+def _wider_areas(trials: Trials, path: Floats) -> Cure:
+    """Name the keep-in areas without which a path was found, and where it leaves them first."""
+    problem, zones = trials.problem, trials.problem.airspace.zones
+    broken = problem.airspace.examine(Legs.of_path(path, problem.limits), problem.limits).violations
+    left = min((v for v in broken if v.zone >= 0), key=lambda v: (v.leg, v.fraction), default=None)
+    title = next(zone.title for zone in zones if zone.outside is not None)
+    if left is None:
+        return Cure(f"without the {title} there is a path")
+    return Cure(f"without the {title} there is a path", (left.east_m, left.north_m), "which leaves it first")
 
 
 def _known(problem: Problem) -> Problem:
@@ -488,7 +502,18 @@ def _together(trials: Trials, lifts: Sequence[Lift]) -> Cure:
 LIFTS = (
     Lift("unknown ground", lambda p: p.airspace.surface.has_unknown, _known, _over_unknown),
     Lift("max_amsl_m", lambda p: p.limits.max_amsl_m is not None, lambda p: _limited(p, max_amsl_m=None), _ceiling),
-    Lift("the no-fly zones", lambda p: len(p.airspace.zones) > 0, lambda p: _zoned(p, ()), _fewer_zones),
+    Lift(
+        NO_FLY,
+        lambda p: len(no_fly_of(p.airspace.zones)) > 0,
+        lambda p: _zoned(p, [zone for zone in p.airspace.zones if zone.outside is not None]),
+        _fewer_zones,
+    ),
+    Lift(
+        "the keep-in areas",
+        lambda p: len(keep_in_of(p.airspace.zones)) > 0,
+        lambda p: _zoned(p, no_fly_of(p.airspace.zones)),
+        _wider_areas,
+    ),
     Lift("max_agl_m", lambda p: p.limits.max_agl_m is not None, lambda p: _limited(p, max_agl_m=None), _above_ground),
     Lift(
         "max_climb_deg and max_descent_deg",

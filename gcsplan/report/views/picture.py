@@ -33,11 +33,12 @@ from gcsplan.report.parts.track_samples import TrackLine, line_of
 from gcsplan.report.views.fleet import apart_m, flown_m, instants, motions_of
 from gcsplan.report.views.scene_data import exaggeration, zone_meshes
 from gcsplan.report.views.shaded_terrain import TINTS, extent_of, relief_of, shaded
-from gcsplan.world.geometry.zones import Circle, Zone
+from gcsplan.world.geometry.zones import Circle, KeepIn, Zone, keep_in_of, no_fly_of, on_map
 from gcsplan.world.world import World
 
 PICTURE_COLOURS = ("#d62728", "#1f77b4", "#9467bd", "#e377c2", "#17becf", "#bcbd22")
 PICTURE_ZONE_COLOUR = "#ff7f0e"
+PICTURE_AREA_COLOUR = "#1a7f37"
 PIXELS = 900
 LABEL_PT, LINE_PT, LETTER_PT = 6.5, 9.0, 4.2
 """Size of a zone's label, height of its line, and mean width of a letter, points."""
@@ -175,10 +176,15 @@ def _map(ax: Axes, page: Page, extent: tuple[float, float, float, float]) -> Non
     tints = LinearSegmentedColormap.from_list("ground", [(at, (r / 255, g / 255, b / 255)) for at, (r, g, b) in TINTS])
     heights = ScalarMappable(Normalize(low, max(high, low + 1.0)), tints)
     ax.figure.colorbar(heights, ax=ax, label="ground, m AMSL")
-    for zone in page.world.airspace.zones:
+    zones = page.world.airspace.zones
+    for zone in on_map(zones):
         ax.add_patch(_zone_patch(zone))
     halo = [withStroke(linewidth=2.0, foreground="white", alpha=0.7)]
-    for words, place in _labels(page.world.airspace.zones, extent):
+    for area in keep_in_of(zones):
+        for part in area.parts:
+            for ring in (part.outline, *part.holes):
+                ax.add_patch(PolygonPatch(ring, fill=False, edgecolor=PICTURE_AREA_COLOUR, linewidth=1.6))
+    for words, place in _labels((*no_fly_of(zones), *keep_in_of(zones)), extent):
         ax.annotate(words, place, ha="center", va="center", fontsize=LABEL_PT, path_effects=halo, zorder=4)
     for vehicle, track, colour in zip(page.subjects, tracks, _colours(len(tracks)), strict=True):
         ax.plot(track[:, 0], track[:, 1], color=colour, lw=2, label=vehicle.name, marker=".", ms=5)
@@ -197,17 +203,20 @@ def _zone_patch(zone: Zone) -> CirclePatch | PolygonPatch:
         patch = CirclePatch((zone.shape.east_m, zone.shape.north_m), zone.shape.radius_m)
     else:
         patch = PolygonPatch(zone.shape.vertices)
-    patch.set(facecolor=PICTURE_ZONE_COLOUR, edgecolor="#a04000", alpha=0.4, linewidth=1.2)
+    line = 1.2 if zone.outside is None else 0.0
+    patch.set(facecolor=PICTURE_ZONE_COLOUR, edgecolor="#a04000", alpha=0.4, linewidth=line)
     return patch
 
 
-def _zone_words(zone: Zone) -> str:
+def _zone_words(zone: Zone | KeepIn) -> str:
     if zone.floor is None and zone.ceiling is None:
         return zone.name
     return f"{zone.name}\n{zone.floor or 'ground'} – {zone.ceiling or 'unlimited'}".replace(" m AGL –", " –")
 
 
-def _labels(zones: Sequence[Zone], extent: tuple[float, float, float, float]) -> list[tuple[str, tuple[float, float]]]:
+def _labels(
+    zones: Sequence[Zone | KeepIn], extent: tuple[float, float, float, float]
+) -> list[tuple[str, tuple[float, float]]]:
     """The label of each zone on the map and its middle: on the zone, or above or below it if another label is there.
 
     Small zones first, since a label beside a large one is hard to assign to it.
@@ -260,7 +269,7 @@ SOLID_COLOUR = "#e0511a"
 def draw_space(title: str, world: World, tracks: Sequence[tuple[str, str, TrackLine]]) -> Figure | None:
     """The figure of ``tracks`` (name, colour and line of each vehicle); None if no ground is known."""
     lines = [line for _, _, line in tracks]
-    relief = relief_of(world, extent_of(lines, world.airspace.zones, world.airspace.surface))
+    relief = relief_of(world, extent_of(lines, no_fly_of(world.airspace.zones), world.airspace.surface))
     if not np.isfinite(relief.low_m):
         return None
     extent, high = relief.extent, exaggeration(relief, lines)
@@ -277,7 +286,7 @@ def draw_space(title: str, world: World, tracks: Sequence[tuple[str, str, TrackL
     look = {"facecolors": colours, "shade": False, "lw": 0, "antialiased": False, "zorder": 1}
     ax.plot_surface(*np.meshgrid(east / km, north / km), ground, rstride=1, cstride=1, **look)
     top = max([relief.high_m, *(float(line.amsl_m.max()) for line in lines)])
-    for mesh in zone_meshes(world.airspace.zones, world.airspace.surface, relief, lines):
+    for mesh in zone_meshes(no_fly_of(world.airspace.zones), world.airspace.surface, relief, lines):
         at = np.array(mesh["at"]).reshape(-1, 3)
         corners = np.column_stack([(at[:, 0] + extent.west_m) / km, (at[:, 1] + extent.south_m) / km, at[:, 2]])
         faces = corners[np.array(mesh["faces"]).reshape(-1, 3)]

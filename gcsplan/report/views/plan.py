@@ -13,7 +13,7 @@ from gcsplan.report.parts.page_data import Page, Subject
 from gcsplan.report.parts.track_samples import TrackLine, distance_m
 from gcsplan.report.views.shaded_terrain import TINTS, MapExtent, Relief, nice_step, tints
 from gcsplan.units import Unit, Units, duration
-from gcsplan.world.geometry.zones import Circle, Level, Zone
+from gcsplan.world.geometry.zones import Circle, KeepIn, Level, Zone, keep_in_of, no_fly_of, on_map
 from gcsplan.world.world import World
 
 NAME_INSIDE = 0.12
@@ -26,7 +26,9 @@ COLOURS = 8
 
 def map_marks(page: Page, lines: Sequence[TrackLine | None], relief: Relief, full: Container[int]) -> list[Mark]:
     """The marks of the map: zones' names, and of the vehicles in ``full`` way points, starts, goals, tight places."""
-    marks = [m for zone in page.world.airspace.zones for m in _zone_mark(zone, relief.extent, page.units)]
+    zones = page.world.airspace.zones
+    named: list[Zone | KeepIn] = [*no_fly_of(zones), *keep_in_of(zones)]
+    marks = [m for zone in named for m in _zone_mark(zone, relief.extent, page.units)]
     for i, (subject, line) in enumerate(zip(page.subjects, lines, strict=True)):
         if line is not None and i in full:
             marks += _track_marks(subject, line, i, relief.extent, page.world, page.units)
@@ -45,7 +47,8 @@ def map_html(
     shapes = [
         f'<image href="{relief.picture}" x="0" y="0" width="10000" height="{height:.1f}" preserveAspectRatio="none"/>',
         f'<path class="contour" d="{relief.contours}"/>' if relief.contours else "",
-        *(_zone_svg(zone, i, extent, page.units) for i, zone in enumerate(zones)),
+        *(_zone_svg(zone, i, extent, page.units) for i, zone in enumerate(on_map(zones))),
+        *(_area_svg(area, extent, page.units) for area in keep_in_of(zones)),
         *(
             _no_return_svg(s, line, extent, page.units)
             for s, line in zip(page.subjects, lines, strict=True)
@@ -54,7 +57,8 @@ def map_html(
         *(_track_svg(line, i, extent) for i, line in enumerate(lines) if line is not None),
         *(_flown_svg(line, extent) for line in flown),
     ]
-    words = f"{len(page.subjects)} vehicle{'s' * (len(page.subjects) != 1)}, {len(zones)} no-fly zones"
+    words = f"{len(page.subjects)} vehicle{'s' * (len(page.subjects) != 1)}, {len(no_fly_of(zones))} no-fly zones"
+    words += f", {len(areas)} keep-in area{'s' * (len(areas) != 1)}" if (areas := keep_in_of(zones)) else ""
     aspect = extent.width_m / extent.height_m
     bar, bar_words = scale_bar(extent.width_m / 8.0, page.units)
     return (
@@ -91,6 +95,9 @@ def legend(page: Page, relief: Relief) -> str:
     contours = f"<li>contours every {num(relief.interval_m, 0 if relief.interval_m >= 1 else 1, units.height)}</li>"
     unknown = "" if relief.all_known else '<li><i class="swatch unknown"></i>ground unknown</li>'
     zone = '<li><i class="swatch zone"></i>no-fly zone</li>' if page.world.airspace.zones else ""
+    if keep_in_of(page.world.airspace.zones):
+        zone = '<li><i class="swatch zone"></i>no-fly: zones, and outside of keep-in areas</li>'
+        zone += '<li><i class="swatch area"></i>edge of a keep-in area</li>'
     homes = ""
     if any(s.home is not None and s.home.unsafe for s in page.subjects):
         homes = '<li><i class="swatch nowhere"></i>no safe return from here</li>'
@@ -103,7 +110,7 @@ def legend(page: Page, relief: Relief) -> str:
     )
 
 
-def zone_heights(zone: Zone, units: Units) -> str:
+def zone_heights(zone: Zone | KeepIn, units: Units) -> str:
     """The range of heights of a zone, in short words."""
     if zone.floor is None and zone.ceiling is None:
         return "all heights"
@@ -117,8 +124,9 @@ def zone_heights(zone: Zone, units: Units) -> str:
 
 
 def _zone_svg(zone: Zone, index: int, extent: MapExtent, units: Units) -> str:
-    title = f"<title>no-fly zone {esc(zone.name)}: {esc(zone_heights(zone, units))}{_size(zone, units)}</title>"
-    part = " part" if zone.floor is not None or zone.ceiling is not None else ""
+    title = f"<title>{esc(zone.label)}: {esc(zone_heights(zone, units))}{_size(zone, units)}</title>"
+    part = " outside" if zone.outside is not None else ""
+    part += " part" if zone.floor is not None or zone.ceiling is not None else ""
     if isinstance(zone.shape, Circle):
         x, y = extent.units(np.array(zone.shape.east_m), np.array(zone.shape.north_m))
         shape = f'circle cx="{x:.1f}" cy="{y:.1f}" r="{zone.shape.radius_m * extent.scale:.1f}"'
@@ -129,11 +137,19 @@ def _zone_svg(zone: Zone, index: int, extent: MapExtent, units: Units) -> str:
     return f'<{shape} class="zone{part}" data-zone="{index}">{title}</{name}>'
 
 
+def _area_svg(area: KeepIn, extent: MapExtent, units: Units) -> str:
+    title = f"<title>keep-in area {esc(area.name)}: {esc(zone_heights(area, units))}</title>"
+    rings = [ring for part in area.parts for ring in (part.outline, *part.holes)]
+    ways = (extent.units(ring[:, 0], ring[:, 1]) for ring in rings)
+    d = " ".join("M" + "L".join(f"{x:.1f},{y:.1f}" for x, y in way) + "Z" for way in ways)
+    return f'<path class="area" d="{d}">{title}</path>'
+
+
 def _size(zone: Zone, units: Units) -> str:
     return f", radius {stated(zone.shape.radius_m, units.distance)}" if isinstance(zone.shape, Circle) else ""
 
 
-def _zone_mark(zone: Zone, extent: MapExtent, units: Units) -> list[Mark]:
+def _zone_mark(zone: Zone | KeepIn, extent: MapExtent, units: Units) -> list[Mark]:
     west, south, east, north = zone.bounds
     large = (north - south) / extent.height_m > NAME_INSIDE
     x, y = _part(extent, 0.5 * (west + east), 0.5 * (south + north) if large else north)
@@ -141,7 +157,7 @@ def _zone_mark(zone: Zone, extent: MapExtent, units: Units) -> list[Mark]:
         return []
     heights = zone_heights(zone, units)
     label = zone.name if heights == "all heights" else f"{zone.name}\n{heights}"
-    return [Mark(x, y, "name" if large else "name beside", label, f"no-fly zone {zone.name}: {heights}", 3)]
+    return [Mark(x, y, "name" if large else "name beside", label, f"{zone.label}: {heights}", 3)]
 
 
 def _track_svg(line: TrackLine, index: int, extent: MapExtent) -> str:

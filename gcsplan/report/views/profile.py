@@ -38,7 +38,7 @@ def profile_html(
         part = slice(p.first, p.last + 1)
         low = level_amsl(p.zone.floor, line.ground_m[part], -math.inf)
         high = level_amsl(p.zone.ceiling, line.ground_m[part], math.inf)
-        title = f"no-fly zone {p.zone.name}: {zone_heights(p.zone, units)}"
+        title = f"{p.zone.label}: {zone_heights(p.zone, units)}"
         shapes.append(axes.area(_wide(run[part], axes), low, high, "zone", title))
     if not np.array_equal(line.top_m, line.ground_m, equal_nan=True):
         shapes.append(axes.area(run, line.ground_m, line.top_m, "obstacles", f"{_standing(world)}, as stated"))
@@ -134,7 +134,7 @@ def _marks(
         low = max(level_amsl(p.zone.floor, line.ground_m[middle : middle + 1], axes.y0)[0], ground)
         high = level_amsl(p.zone.ceiling, line.ground_m[middle : middle + 1], axes.y1)[0]
         y = min(max(0.5 * (max(low, axes.y0) + min(high, axes.y1)), axes.y0), axes.y1)
-        tip = f"no-fly zone {p.zone.name}: {zone_heights(p.zone, units)}; {passed(p, units)}"
+        tip = f"{p.zone.label}: {zone_heights(p.zone, units)}; {passed(p, units)}"
         marks.append(axes.mark(line.run_m[middle], float(y), "name", p.zone.name, tip, 3))
     lowest = subject.verdict.lowest
     if lowest is not None:

@@ -147,9 +147,10 @@ def _limits(subject: Subject, line: TrackLine | None, units: Units) -> list[Limi
                      least(near.zone_clearance_m, 2, distance), near.zone_clearance_m - needed_m, distance,
                      f"item {near.seq}, {esc(near.nearest_zone)}", max(CLOSE * needed_m, 1.0)))  # fmt: skip
     if (over := verdict.zone_pass) is not None:
-        rows.append((f"height {over.side} a zone, less the error", f"{stated(error, distance)} error",
-                     least(over.height_m, 2, distance), over.height_m - error, distance,
-                     f"item {over.seq}, {esc(over.zone)}", max(CLOSE * error, 1.0)))  # fmt: skip
+        kept = f"{stated(limits.vertical_clearance_m, distance)} + " if limits.vertical_clearance_m else ""
+        rows.append((f"height {over.side} a zone, less the error", f"{kept}{stated(error, distance)} error",
+                     least(over.height_m, 2, distance), over.height_m - limits.over_zone_m, distance,
+                     f"item {over.seq}, {esc(over.zone)}", max(CLOSE * limits.over_zone_m, 1.0)))  # fmt: skip
     if line is not None:
         rows += _height_left(subject, line, units)
     rows += _steepness(flown, limits.max_climb_deg, limits.max_descent_deg)

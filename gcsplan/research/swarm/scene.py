@@ -266,7 +266,7 @@ def _zones(air: Airspace, limits: Limits) -> tuple[Floats, Floats]:
         middle = 0.5 * (table.box_m[zone, :2] + table.box_m[zone, 2:])
         zones[zone, [k.ZE, k.ZN, k.ZR]] = *middle, np.hypot(*(table.corners_m(zone) - middle).T).max()
     zones[:, k.REACH] = air.beside_m(limits)
-    zones[:, [k.Z_LOW, k.Z_HIGH]] = np.clip(np.transpose(table.levels_m(limits.altitude_error_m)), -FAR, FAR)
+    zones[:, [k.Z_LOW, k.Z_HIGH]] = np.clip(np.transpose(table.levels_m(limits.over_zone_m)), -FAR, FAR)
     zones[:, [k.LOW_AGL, k.HIGH_AGL]] = table.over_ground
     # The centre of IB-ABC's sphere for a zone is half-way up, or at 0 if the zone has no ceiling.
     low, high = table.levels_m()

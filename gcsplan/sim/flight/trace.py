@@ -144,12 +144,16 @@ def _off(a: Floats, b: Floats, inner: Floats) -> tuple[Floats, Floats]:
 
 def _finding(v: Violation, trace: Trace, sample: int, world: World) -> Finding:
     lat, lon = _degrees(world, np.array([v.east_m, v.north_m]))
-    name = world.airspace.zones[v.zone].name if v.zone >= 0 else ""
+    zone = world.airspace.zones[v.zone] if v.zone >= 0 else None
+    name = "" if zone is None else zone.name_at(v.east_m, v.north_m)
     time_s, seq, who, at_m = float(trace.times_s[sample]), int(trace.seq[sample]), trace.name, v.amsl_m
     if v.kind == "coverage":
         note = Note("flew_over_unknown_ground", seq, name=who, time_s=time_s, lat=lat, lon=lon, amsl_m=at_m)
-    elif v.kind == "zone":
-        note = Note("flew_into_zone", seq, name=who, zone=name, by_m=v.by, time_s=time_s, lat=lat, lon=lon, amsl_m=at_m)
+    elif zone is not None:
+        note = Note(
+            "flew_into_zone" if zone.outside is None else "flew_out_of_keep_in", seq, name=who, zone=name, by_m=v.by,
+            time_s=time_s, lat=lat, lon=lon, amsl_m=at_m,
+        )  # fmt: skip
     else:
         note = Note(FLOWN_NOTES[v.kind], seq, name=who, by_m=v.by, time_s=time_s, lat=lat, lon=lon, amsl_m=at_m)
     return Finding(seq, v.kind, note, lat, lon, v.amsl_m, v.value, v.limit, v.by, v.unit, name)

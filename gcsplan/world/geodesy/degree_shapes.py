@@ -282,8 +282,7 @@ def wide_fault(points: Sequence[Corner], holes: int = 0, *, closed: bool = True)
     if holes:
         return (
             f"the polygon is {width:g}° of longitude wide and has a hole: it is a keep-in area, outside of which "
-            "all is no-fly, and gcsplan has none yet; leave it out, and draw what may not be flown near the mission as "
-            "polygons without holes"
+            "all is no-fly, and this format has none: draw the hole in a file of its own, and name that under keep_in"
         )
     ends = np.roll(at, -1, axis=0)[: None if closed else -1]
     at = at[: len(ends)]
@@ -305,6 +304,11 @@ def wide_fault(points: Sequence[Corner], holes: int = 0, *, closed: bool = True)
         f"the edge from {lat0:.6g}, {lon0:.7g} to {lat1:.6g}, {lon1:.7g} spans {abs(step[k]):.6g}° of longitude, and "
         f"from {HALF_TURN_DEG:g}° on it may run on either side of the globe: {cure}"
     )
+
+
+def is_world(ring: Sequence[Corner]) -> bool:
+    """Whether an outline in degrees is so wide that its holes, if it has some, are keep-in areas."""
+    return _width_deg(ring) >= HALF_TURN_DEG
 
 
 def across(points: Sequence[Corner], holes: int = 0) -> tuple[Sequence[Corner], tuple[Corner, ...]]:

@@ -11,7 +11,8 @@ class Limits:
     """Limits and errors of one vehicle; metres and degrees. ``None`` means no limit.
 
     ``track_error_m`` and ``altitude_error_m`` widen every check: the aircraft may be that far from the mission's line.
-    Touching a limit is legal.
+    ``horizontal_clearance_m`` is kept from zones to the side, ``vertical_clearance_m`` above and below them. Touching a
+    limit is legal.
     """
 
     min_agl_m: float
@@ -22,6 +23,12 @@ class Limits:
     altitude_error_m: float = 0.0
     max_climb_deg: float = 90.0
     max_descent_deg: float = 90.0
+    vertical_clearance_m: float = 0.0
+
+    @property
+    def over_zone_m(self) -> float:
+        """Metres above and below the line within which no zone may be: the error and the clearance."""
+        return self.altitude_error_m + self.vertical_clearance_m
 
     @property
     def max_climb_slope(self) -> float:

@@ -39,7 +39,7 @@ EXTREMA = "f4[,,] f4[,,] f4[,,] i1[,] i8 i8"
 ZONES = "f8[,] f8[,] f8[] i8[] i8[] i8"
 """Forms of arguments that stay the same over many calls: the map with one or both surfaces, extrema, zones."""
 
-LEGS, DEMANDS = "f8[,] f8[,] b1[] f8[] f8[]", "f8 f8 f8 f8 f8 f8 f8"
+LEGS, DEMANDS = "f8[,] f8[,] b1[] f8[] f8[]", "f8 f8 f8 f8 f8 f8 f8 f8"
 """Forms of legs (`airspace.Legs`) and of `Demands`."""
 
 FOUND = "f8[,] f8[,,] i8[] i8[,] f8[,]"

@@ -19,7 +19,7 @@ def judge(
     table: Floats, vertex: Floats, lattice: Floats, bucket: Int64s, near_zones: Int64s, most_corners: int,
     start: Floats, end: Floats, column: Bools, track: Floats, altitude: Floats,
     min_agl_m: float, max_agl_m: float, max_amsl_m: float, clearance_m: float, scale: float,
-    max_climb: float, max_descent: float,
+    max_climb: float, max_descent: float, over_m: float,
     full: bool, ok: Bools, found: Floats, worst: Floats, nearest: Int64s, hit: Int64s, hit_at: Floats,
     stack: Floats, out: Floats, events: Floats, seen: Int64s, list_of: Int64s,
 ) -> int:  # fmt: skip
@@ -31,7 +31,7 @@ def judge(
         LocalExtrema(over_slope, over_high, over_low, over_gaps, over_cols, over_rows),
         Zones(table, vertex, lattice, bucket, near_zones, most_corners),
         start, end, column, track, altitude,
-        Demands(min_agl_m, max_agl_m, max_amsl_m, clearance_m, scale, max_climb, max_descent),
+        Demands(min_agl_m, max_agl_m, max_amsl_m, clearance_m, scale, max_climb, max_descent, over_m),
         full, ok, found, worst, nearest, hit, hit_at, stack, out, events, seen, list_of,
     )  # fmt: skip
 

@@ -148,7 +148,6 @@ def judge(
     fraction; ``nearest`` (n,) zone; and, as many as fit, ``hit`` (leg, zone), ``hit_at`` (signed distance, fraction).
     """
     zone = zs.table
-    zones = len(zone)
     hits = 0
     for i in range(len(start)):
         e0, n0, h0 = start[i, 0], start[i, 1], start[i, 2]
@@ -173,7 +172,7 @@ def judge(
             continue
         reach = (track[i] + limits.clearance_m) * limits.scale
         west, east, south, north = min(e0, e1), max(e0, e1), min(n0, n1), max(n0, n1)
-        count = zones
+        count = len(zone)
         if not full:
             count = candidates(
                 zone, zs.lattice, zs.bucket, zs.near, west - reach, south - reach, east + reach, north + reach,
@@ -189,8 +188,9 @@ def judge(
                 if gap > 0.0 and gap >= best and gap >= reach:
                     continue
             broken, dist, at = meets(
-                m, ground, zone, zs.vertex, k, e0, n0, h0, e1, n1, h1, altitude[i], reach, stack, events, full, out
-            )
+                m, ground, zone, zs.vertex, k, e0, n0, h0, e1, n1, h1, altitude[i] + limits.over_m, reach, stack,
+                events, full, out,
+            )  # fmt: skip
             if broken:
                 fine = False
                 if not full:

@@ -87,7 +87,7 @@ class LocalExtrema(NamedTuple):
 class Demands(NamedTuple):
     """Limits for the kernel; ``inf`` means no limit. ``max_climb``, ``max_descent``: rise over run.
 
-    ``clearance_m`` and track errors times ``scale`` are metres of the plane.
+    ``clearance_m`` and track errors times ``scale`` are metres of the plane; ``over_m`` is kept above and below zones.
     """
 
     min_agl_m: float
@@ -97,6 +97,7 @@ class Demands(NamedTuple):
     scale: float
     max_climb: float
     max_descent: float
+    over_m: float
 
     @classmethod
     def of(cls, limits: Limits, scale: float) -> Demands:
@@ -109,6 +110,7 @@ class Demands(NamedTuple):
             float(scale),
             steepest(limits.max_climb_deg),
             steepest(limits.max_descent_deg),
+            float(limits.vertical_clearance_m),
         )
 
 

@@ -38,8 +38,9 @@ from gcsplan.sim.vehicle.loopback import LoopbackVehicle
 from gcsplan.sim.vehicle.misbehaviour import Misbehaviour
 from gcsplan.sim.vehicle.server import SimServer, loopback_fleet
 from gcsplan.vehicle import Autopilot, Vehicle
+from gcsplan.world.geometry.outside import outside_of
 from gcsplan.world.geometry.path import Path as FlightPath
-from gcsplan.world.geometry.zones import Circle, Level, Polygon, Zone
+from gcsplan.world.geometry.zones import AreaPart, Circle, KeepIn, Level, Polygon, Zone
 from gcsplan.world.world import World
 from tests.support import lossy
 from tests.support.effort import draws
@@ -387,3 +388,68 @@ def test_plan_and_upload_send_the_fence_where_that_is_asked_for(run: Any) -> Non
         assert run("upload", "out/uav1.waypoints", *to, "--unchecked", "--fence")[0] == 2
         assert run("clear", *to, "--type", "fence")[0] == 0
     assert board.items(FENCE) == ()
+
+
+# -- keep-in areas --------------------------------------------------------------------------------------------------
+
+
+def area_of(name: str, ring: list[tuple[float, float]], *holes: list[tuple[float, float]], **levels: Level) -> KeepIn:
+    inner = tuple(np.array(hole, float) for hole in holes)
+    return KeepIn(name, (AreaPart(np.array(ring, float), inner),), **levels)
+
+
+WEST = area_of("west", [(-300, -200), (300, -200), (300, 300), (-300, 300)], [(50, 150), (90, 150), (70, 180)])
+EAST = area_of("east", [(300, -200), (700, -200), (700, 390), (300, 390)], ceiling=Level(900.0, "amsl"))
+APART = area_of("apart", [(900, 0), (990, 0), (990, 90)])
+
+
+@pytest.mark.parametrize("autopilot", list(Autopilot))
+def test_the_fence_of_areas_is_an_inclusion_polygon_read_back_from_the_vehicle(autopilot: Autopilot) -> None:
+    zones_of = outside_of([WEST, EAST, APART], 240_000.0)
+    fence = fence_of([*zones_of, Zone("hut", Circle(200, -50, 20))], FRAME, autopilot)
+    craft = LoopbackVehicle(1, autopilot, lat_deg=36.6, lon_deg=-84.3, amsl_m=300.0)
+    with SimServer([craft], "udpin:127.0.0.1:0", speedup=10.0) as server, Link(server.url_for_gcs) as link:
+        options = session.SessionOptions(listen_s=0.1, discover_s=5.0)
+        result = session.upload_items(link, 1, fence.items, autopilot, FENCE, options=options, name="uav1")
+        assert result.verified, result.differences
+        back = areas_of(session.download_items(link, 1, FENCE, options=options), FRAME)
+    assert [(a.inclusion, z.name) for a, z in zip(back, fence.zones, strict=True)] == [
+        (False, "hut"), (True, "keep-in areas"), (False, "hole in keep-in areas"),
+    ]  # fmt: skip
+    both = shapely.union_all([part.shape() for area in (WEST, EAST) for part in area.parts])
+    whole, hole = outline(back[1].shapes[0]), outline(back[2].shapes[0])
+    assert whole.difference(hole).covers(both)
+    assert whole.difference(hole).hausdorff_distance(both) < 0.5
+    assert {note.code for note in fence.notes} == {"fence_of_one_piece", "fence_areas_without_heights"}
+
+
+def test_the_fence_is_of_the_piece_around_home() -> None:
+    home = tuple(FRAME.to_degrees(950.0, 30.0).tolist())
+    (zone,) = fence_of(outside_of([WEST, APART], 240_000.0), FRAME, COPTER, home=home).zones
+    assert outline(zone.shape).covers(APART.parts[0].shape())
+    assert outline(zone.shape).area < 1.1 * APART.parts[0].shape().area
+
+
+def test_a_flight_at_the_limit_of_its_areas_does_not_breach_their_fence() -> None:
+    tight = area_of("tight", [(-4, -4), (3001, -4), (6004, 996), (6004, 1004.5), (5990, 1004.5), (2999, 4), (-4, 4)])
+    where, craft = world(zones=outside_of([tight], 240_000.0)), vehicle()
+    mission = mission_in(where, craft)
+    assert not [f for f in judge(mission, craft, where).findings if f.kind == "zone"]
+    assert len(fence_breaches.fence_for(mission, craft, where).items) == 7
+
+
+def test_areas_of_more_corners_than_are_stored_are_fenced_by_fewer_around_them() -> None:
+    turn = np.linspace(0.0, 2.0 * np.pi, 300, endpoint=False)
+    ring = (2000.0 + 100.0 * np.sin(9.0 * turn))[:, None] * np.column_stack([np.cos(turn), np.sin(turn)])
+    area = KeepIn("round", (AreaPart(ring),))
+    fence = fence_of([*outside_of([area], 240_000.0), *circles(8)], FRAME, COPTER)
+    assert len(fence.items) < 8 + 58
+    (wider,) = [note for note in fence.notes if note.code == "fence_area_wider"]
+    assert wider.data["given"] == 300
+    kept = next(a for a in areas_of(fence.items, FRAME) if a.inclusion)
+    assert outline(kept.shapes[0]).covers(shapely.Polygon(ring))
+
+
+def test_areas_that_are_all_far_away_have_no_fence() -> None:
+    with pytest.raises(InputError, match="'far' are far from the mission"):
+        fence_of(outside_of([KeepIn("far", ())], 240_000.0), FRAME, COPTER)

@@ -74,6 +74,10 @@ def test_a_wide_polygon_with_corners_between_is_read_as_drawn(tmp_path: Path, fo
 def test_a_world_with_a_hole_is_called_a_keep_in_area(tmp_path: Path, form: str, pieces: int) -> None:
     outer, hole = band(-180.0, 180.0, -85.0, 85.0, pieces), band(14.0, 15.0, 45.5, 46.5)
     found = read_zones(WRITERS[form](tmp_path, [[outer, hole]]), where="zones")
+    if form not in ("ed269", "ed318", "openaip"):  # no authority's: the hole is read as what it is
+        assert not found.problems
+        assert [draft.keep_in for draft in found.zones] == [True]
+        return
     said = [*found.problems, *(fault for draft in found.zones for fault in draft.faults)]
     assert "is a keep-in area" in said[0].message
     assert "zone 'z'" in said[0].message

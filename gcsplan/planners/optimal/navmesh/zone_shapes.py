@@ -165,11 +165,11 @@ def _set_levels(
     """Fill in the levels of a part, for bounds (``sign`` -1) or for paths (1), off by a margin ``off_m``; ``levels_m``,
     ``over_ground`` (2,): floor and ceiling of its zone."""
     row[LOOKS] = sign < 0.0 and moved_m > 0.0
-    row[THIN] = 2.0 * (limits.altitude_error_m - off_m) if sign < 0.0 else -np.inf
+    row[THIN] = 2.0 * (limits.over_zone_m - off_m) if sign < 0.0 else -np.inf
     for side, at, own, more in ((0, BOTTOM, OWN_BOTTOM, -1.0), (1, TOP, OWN_TOP, 1.0)):
         # For paths, AMSL levels get no margin for rounding: a zone may be exactly as high as the ceiling.
         off = sign * off_m if over_ground[side] or sign < 0.0 else -TOUCH_M
-        row[at] = row[own] = levels_m[side] + more * (limits.altitude_error_m + off)
+        row[at] = row[own] = levels_m[side] + more * (limits.over_zone_m + off)
         row[at + 2] = over_ground[side]
         if over_ground[side] and moved_m > 0.0 and sign > 0.0:
             row[at + 2] = BESIDE

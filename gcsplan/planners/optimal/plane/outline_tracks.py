@@ -93,9 +93,9 @@ def _sides(problem: Problem) -> tuple[Bools, Floats]:
     limits, surface, table = problem.bound_limits, problem.airspace.surface, problem.airspace.zone_table
     high = float(np.nanmax(surface.ground_m)) if table.follow_ground.any() else 0.0
     low = float(np.nanmin(surface.ground_m))
-    bottoms_m, _ = table.levels_m(limits.altitude_error_m)
+    bottoms_m, _ = table.levels_m(limits.over_zone_m)
     # A floor AGL and the lowest legal altitude count from the same ground, except for ground within clearance.
     beside_m = high - low if problem.airspace.beside_m(limits) > 0.0 else 0.0
     lowest_m = limits.min_agl_m + limits.altitude_error_m
     under = bottoms_m - lowest_m - np.where(table.over_ground[:, 0], -beside_m, low) >= -HARDLY_M
-    return under, table.levels_m(limits.altitude_error_m, low)[1]
+    return under, table.levels_m(limits.over_zone_m, low)[1]

@@ -244,4 +244,4 @@ def above_all(problem: Problem) -> float:
     _, tops = problem.airspace.zone_table.levels_m(ground_m=high)
     ends = [problem.start[2], problem.goal[2], *(v.amsl_m for v in problem.via if v.amsl_m is not None)]
     most = max(high + limits.min_agl_m, float(tops[np.isfinite(tops)].max(initial=0.0)), *ends)
-    return most + limits.altitude_error_m + 2.0 * limits.track_error_m + 100.0
+    return most + limits.over_zone_m + 2.0 * limits.track_error_m + 100.0

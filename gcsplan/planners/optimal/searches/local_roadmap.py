@@ -251,7 +251,7 @@ def _box(problem: Problem, ends: Floats, limit: float) -> tuple[Floats, Floats]:
 def _heights(problem: Problem, ends: Floats, low: Floats, high: Floats) -> tuple[float, float, list[float]]:
     """The lowest and the highest altitude worth a look, and the altitudes at which zones and ends begin and end."""
     limits, surface = problem.limits, problem.airspace.surface
-    error = limits.altitude_error_m + HAIR_M
+    error = limits.over_zone_m + HAIR_M
     east, north = (a.ravel() for a in np.meshgrid(*(np.linspace(low[k], high[k], 40) for k in range(2))))
     floor = problem.floors(east, north)
     floor = floor[np.isfinite(floor)]
