@@ -76,7 +76,7 @@ class Case:
     altitude_frame: str = "relative"
     arrival: dict[str, object] | None = None
     inside_m: float = 0.0
-    """Above 0: what is free within so many metres around all is written as keep-in areas, and no zone is."""
+    """Above 0: the free part of the plane within so many metres around all is written as keep-in areas, no zone is."""
 
     def areas(self) -> list[Floats]:
         """Rings that share edges: together the box around all, without the barriers."""

@@ -97,7 +97,7 @@ def outside_of(areas: Sequence[KeepIn], far_m: float, *, slit_m: float = 0.0) ->
 
 
 def _polygons(shape: shapely.Geometry) -> list[Any]:
-    """The polygons of a shape, without those that are as thin as rounding."""
+    """The polygons of a shape; polygons as thin as rounding are left out."""
     import shapely
 
     return [p for p in shapely.get_parts(shape) if p.geom_type == "Polygon" and p.area > GRID_M * p.length]
@@ -112,7 +112,7 @@ def _union(shapes: Sequence[shapely.Geometry], slit_m: float) -> shapely.Geometr
         return whole
     wider = shapely.buffer(whole, slit_m)  # with round corners: nothing is added farther than this from the areas
     closed = shapely.buffer(wider, -slit_m, join_style="mitre", mitre_limit=2.0)
-    # What is no wider than the noise of that is none; a hair more around a slit joins it to the areas, not to outside.
+    # Parts as thin as the noise of both buffers are no slits. A hair more around a slit joins it to the areas.
     parts = shapely.get_parts(shapely.difference(closed, whole))
     slits = [p for p in parts if not shapely.buffer(p, -4.0 * GRID_M).is_empty]
     joined = [shapely.intersection(shapely.buffer(p, SEAM_M), closed) for p in slits]

@@ -141,7 +141,7 @@ class Zone:
     floor: Level | None = None
     ceiling: Level | None = None
     outside: Outside | None = None
-    """Of what it is a part, if it is no no-fly zone."""
+    """The outside of keep-in areas that it is a part of; None: it is a no-fly zone."""
 
     @property
     def follows_ground(self) -> bool:

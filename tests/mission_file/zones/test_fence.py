@@ -50,7 +50,6 @@ def test_a_fence_saved_as_way_points_is_read_as_zones(tmp_path: Path) -> None:
         (OUT[:2], "a polygon of 3 corners needs as many rows of command 5002 that say so; 2 follow each other"),
         ([*OUT, (16, 0, 46.0, 14.0)], "command 16 is none of a fence"),
         ([(5004, 0, 46.0, 14.0)], "must be above 0"),
-        ([(5001, 3, *corner) for corner in TRIANGLE], "keeps the aircraft in"),
         ([(16, 0, 46.0, 14.0)], "the file holds a mission, and no fence"),
         ([(5100, 0, 46.0, 14.0)], "the file holds rally points, and no fence"),
         ([], "the file holds nothing, and no fence"),
@@ -64,6 +63,16 @@ def test_a_fence_that_is_not_whole_or_no_zone_says_so(tmp_path: Path, items: Any
     except InputError as why:
         said = str(why)
     assert words in said
+
+
+def test_inclusion_areas_of_a_fence_are_keep_in_areas(tmp_path: Path) -> None:
+    path = tmp_path / "a.waypoints"
+    path.write_text(fence_rows(*[(5001, 3, *corner) for corner in TRIANGLE], (5004, 100, 46.1, 14.6)))
+    assert [(z.keep_in, z.radius_m) for z in read_zones(path, where="zones").zones] == [(True, None), (False, 100.0)]
+    for name in ("a.fen", "a.txt"):
+        (tmp_path / name).write_text(HEAD + RETURN + CORNERS + FIRST)
+        (zone,) = read_zones(tmp_path / name, where="zones").zones
+        assert (zone.keep_in, zone.points) == (True, tuple(TRIANGLE))
 
 
 HEAD = "#saved by Mission Planner 1.3.80\n"
@@ -85,7 +94,6 @@ def test_a_drawn_polygon_of_mission_planner_is_a_zone(tmp_path: Path, written: s
 @pytest.mark.parametrize(
     ("written", "words"),
     [
-        (RETURN + CORNERS + FIRST, "keeps the aircraft in"),
         (RETURN + CORNERS, "is the file whole?"),
         (RETURN + "46.02 14.47 3\n", "line 3: a line holds latitude and longitude, as `46.02 14.47`, given"),
         ("14.47 46.02\nEND\n", "this is OpenStreetMap's .poly"),
