@@ -1,19 +1,20 @@
 """Kernels of the sections across a leg: floors and ceilings along them, and the cheapest chains of their nodes.
 
-A section's nodes lie in one row of the arrays, from ``first[k]`` to ``first[k + 1]``.
+A section's nodes lie in one row of the arrays, from ``first[k]`` to ``first[k + 1]``, in the order of ``aside``.
 """
 
 from __future__ import annotations
 
 import math
 
-from gcsplan.arrays import Bools, Floats, Int32s, Int64s
+from gcsplan.arrays import Floats, Int64s
 from gcsplan.planners.compiled import device, kernel
 
-STEP, MOST, BENT, SLANT, SWAY, BACK = range(6)
-"""Indices of the numbers in `cheapest_chain`'s ``spec``: metres between nodes; most metres of track; the greatest price
-at which costs are lengths in space; the greatest ``slant``; by how much that changes with the price, at most; whether
-the sums are of the legs to each node (0) or from it."""
+STEP, LEVEL, MOST = range(3)
+"""Indices of the numbers in `cheapest_chains`'s ``spec``: metres between nodes; the cost of a level metre; the greatest
+sum of a chain that counts."""
+NONE = 1e30
+"""The value of a node that no chain reaches."""
 
 
 @device
@@ -39,28 +40,25 @@ def _next_line(a: float, b: float, t: float) -> float:
 
 
 @device
-def _sag(z: Floats, sign: float, r0: float, c0: float, r1: float, c1: float, z0: float, z1: float) -> float:
-    """The most by which the straight line from ``z0`` to ``z1`` exceeds ``sign`` times the heights between two places:
-    exact, for between two grid lines heights are quadratic. NaN if one of them is not known."""
-    most, t = -math.inf, 0.0
-    begin = sign * _height(z, r0, c0)
+def _least(z: Floats, sign: float, r0: float, c0: float, r1: float, c1: float) -> float:
+    """The least of ``sign`` times the heights between two places: exact, for between two grid lines heights are
+    quadratic. NaN if one of them is not known."""
+    begin = least = sign * _height(z, r0, c0)
+    t = 0.0
     while t < 1.0:
         to = min(max(min(_next_line(r0, r1, t), _next_line(c0, c1, t)), t + 1e-9), 1.0)
         half = 0.5 * (t + to)
         middle = sign * _height(z, r0 + half * (r1 - r0), c0 + half * (c1 - c0))
         end = sign * _height(z, r0 + to * (r1 - r0), c0 + to * (c1 - c0))
-        if math.isnan(middle) or math.isnan(end):
+        if math.isnan(begin) or math.isnan(middle) or math.isnan(end):
             return math.nan
         bend = 2.0 * (begin + end) - 4.0 * middle  # heights are begin + rise u + bend u², for u from 0 to 1
         rise = end - begin - bend
-        line, its_rise = z0 + t * (z1 - z0), (to - t) * (z1 - z0)
-        most = max(most, line - begin, line + its_rise - end)
-        if bend > 0.0:
-            u = (its_rise - rise) / (2.0 * bend)
-            if 0.0 < u < 1.0:
-                most = max(most, line + u * its_rise - begin - rise * u - bend * u * u)
+        least = min(least, end)
+        if bend > 0.0 and -2.0 * bend < rise < 0.0:
+            least = min(least, begin - 0.25 * rise * rise / bend)
         begin, t = end, to
-    return most
+    return least
 
 
 @kernel("f8[,] f8 f8 f8 i8[] f8[] f8[] f8[,] f8[]")
@@ -68,7 +66,7 @@ def lay_sections(
     z: Floats, sign: float, more: float, least: float, first: Int64s, row: Floats, col: Floats, beside: Floats,
     out: Floats,
 ) -> bool:  # fmt: skip
-    """Values at the nodes, such that the straight line from node to node is nowhere above the floor.
+    """The least floor at any place between a node's two neighbours, for each node; of a node alone, the floor at it.
 
     The floor at a place is ``more`` above ``least``, and above ``sign`` times the heights at the places ``beside``
     (J, 2: rows and columns from it). With ``sign`` -1 it is a ceiling, upside down. Returns False if a height that
@@ -76,110 +74,97 @@ def lay_sections(
     """
     for k in range(len(first) - 1):
         begin, end = first[k], first[k + 1]
+        before = math.inf
         for n in range(begin, end):
-            value = least
-            for j in range(len(beside)):
-                height = sign * _height(z, row[n] + beside[j, 0], col[n] + beside[j, 1])
-                if math.isnan(height):
-                    return False
-                value = max(value, height)
-            out[n] = value
-        before = 0.0
-        for n in range(begin, end):
-            sag = 0.0
-            if n + 1 < end:
-                sag = max(out[n], out[n + 1]) - least
+            here = math.inf
+            if n + 1 < end or end - begin == 1:
+                here = least
+                to = min(n + 1, end - 1)
                 for j in range(len(beside)):
                     r, c = beside[j, 0], beside[j, 1]
-                    here = _sag(z, sign, row[n] + r, col[n] + c, row[n + 1] + r, col[n + 1] + c, out[n], out[n + 1])
-                    if math.isnan(here):
+                    height = _least(z, sign, row[n] + r, col[n] + c, row[to] + r, col[to] + c)
+                    if math.isnan(height):
                         return False
-                    sag = min(sag, max(here, 0.0))
-            out[n] += more - max(sag, before)
-            before = sag
+                    here = max(here, height)
+            out[n] = more + min(here, before)
+            before = here
     return True
 
 
 @device
-def _run(x: Floats, y: Floats, i: int, j: int) -> float:
-    dx, dy = x[j] - x[i], y[j] - y[i]
-    return math.sqrt(dx * dx + dy * dy)
-
-
-@kernel("i8[] f8[] f8[] f8[] f8[] b1[] f8[] f8[] f8[] f8[] f8[] f8[] f8[] f8[] f8[] i4[]")
-def cheapest_chain(
-    first: Int64s, x: Floats, y: Floats, low: Floats, high: Floats, shut: Bools, loose: Floats, price: Floats,
-    slant: Floats, vary: Floats, away: Floats, left: Floats, spec: Floats, room: Floats, value: Floats, near: Int32s,
+def _take_leg(
+    value: Floats, near: Floats, m: int, n: int, run: float, turn: float, low: float, high: float, slope: Floats,
+    slant: Floats, beyond: Floats,
 ) -> None:  # fmt: skip
-    """The least sum of the legs' costs up to each node (``value``), and the node before it (``near``; -1: none).
+    """Lower the values of node n to what a leg of ``run`` metres from node m allows.
 
-    A leg from node i costs ``slant[i]`` times its metres of track and ``price[i]`` times the metres that it rises. So
-    a node's altitude counts with the difference of the prices before and after it: at its floor or its ceiling.
-    ``value`` leaves out the price after the node. Each leg costs less by what rounding to nodes may add
-    (docs/planner.md, "Sections"): altitudes change by up to ``loose``, and prices by ``vary``, from node to node.
-    With ``spec[BACK]``, the sums are of the legs from each node to the last one. ``room``: a number for each node of a
-    section.
+    The highest plane at the floor stays above a plane that rises less, so that one may be raised to meet it there; and
+    one that rises more, to meet the highest at the ceiling.
     """
-    back = spec[BACK] > 0.0
-    sections = len(first) - 1
-    square, sway = spec[STEP] * spec[STEP], spec[SWAY] * spec[STEP]
-    for step in range(sections - 1):
-        k = sections - 2 - step if back else step
-        to0, to1 = (first[k], first[k + 1]) if back else (first[k + 1], first[k + 2])
-        of0, of1 = (first[k + 1], first[k + 2]) if back else (first[k], first[k + 1])
-        nearest = begin = end = of0
-        for n in range(to0, to1):
-            value[n], near[n] = math.inf, -1
-            if shut[n]:
-                continue
-            # The other section's nodes are in order: from the nearest one, go both ways until it is too far. The nodes
-            # near enough to one node are mostly near enough to the next one.
-            while nearest + 1 < of1 and _run(x, y, nearest + 1, n) <= _run(x, y, nearest, n):
+    at_low = at_high = -math.inf
+    low_cut = high_cut = 0
+    for q in range(len(slope)):
+        plane = value[q, m] + slant[q] * run - beyond[q] * turn
+        here, there = plane + slope[q] * low, plane + slope[q] * high
+        if here >= at_low:
+            at_low, low_cut = here, q
+        if there > at_high:
+            at_high, high_cut = there, q
+    for q in range(len(slope)):
+        if q < low_cut:
+            cost = at_low - slope[q] * low
+        elif q > high_cut:
+            cost = at_high - slope[q] * high
+        else:
+            cost = value[q, m] + slant[q] * run - beyond[q] * turn
+        if cost < value[q, n]:
+            value[q, n], near[q, n] = cost, m
+
+
+@kernel("i8[] f8[] f8[] f8[] f8[] f8[] f8[] f8[] f8[] f8[] f8[] f8[,] f8[,]")
+def cheapest_chains(
+    first: Int64s, gap: Floats, aside: Floats, low: Floats, high: Floats, left: Floats, slope: Floats, slant: Floats,
+    beyond: Floats, spec: Floats, least: Floats, value: Floats, near: Floats,
+) -> int:  # fmt: skip
+    """Lower bounds of the cost of chains from the first node to each node, at every altitude; returns the legs counted.
+
+    At node n and altitude z, a chain costs at least ``value[q, n] + slope[q] * z``, for each q; ``near[q, n]`` is the
+    node before it of the chain that decides. A leg costs no less than each plane (docs/planner.md, "Sections"):
+    ``slant[q]`` for a metre of track, ``slope[q]``, rising from q to q, for a metre of climb, less ``beyond[q]`` for
+    each metre of track that rounding may take. Sections k and k + 1 are ``gap[k]`` apart, and the goal is ``left`` (N,)
+    metres away. The caller sets ``value`` at the first node. ``least`` (N,): to work in.
+    """
+    pairs, step, level = 0, spec[STEP], spec[LEVEL]
+    least[0] = fewest = 0.0
+    for k in range(len(first) - 2):
+        of0, of1, flat = first[k], first[k + 1], gap[k]
+        nearest, next_fewest = of0, math.inf
+        for n in range(of1, first[k + 2]):
+            value[:, n], near[:, n] = NONE, -1.0
+            most = spec[MOST] - level * left[n]
+            while nearest + 1 < of1 and abs(aside[nearest + 1] - aside[n]) <= abs(aside[nearest] - aside[n]):
                 nearest += 1
-            while nearest > of0 and _run(x, y, nearest - 1, n) < _run(x, y, nearest, n):
-                nearest -= 1
-            rest = away[n] if back else left[n]
-            most = spec[MOST] - rest
-            begin, end = min(begin, nearest), max(end, nearest)
-            while begin > of0 and _run(x, y, begin - 1, n) <= most:
-                begin -= 1
-            while begin < nearest and _run(x, y, begin, n) > most:
-                begin += 1
-            while end < of1 and _run(x, y, end, n) <= most:
-                end += 1
-            while end > nearest and _run(x, y, end - 1, n) > most:
-                end -= 1
-            # Rounding adds the more, the shorter the leg.
-            each = 0.125 / max(_run(x, y, nearest, n) - spec[STEP], spec[STEP])
-            flat = spec[SLANT] * square * each
-            px, py, own, off, up, down = x[n], y[n], price[n], loose[n], low[n], high[n]
-            u, v, its, sums = x[begin:end], y[begin:end], price[begin:end], value[begin:end]
-            far, its_off = (left[begin:end], loose[begin:end]) if back else (away[begin:end], loose[begin:end])
-            # Branches in this loop would take as long as all else.
-            if back:
-                lows, highs, a, swing = low[begin:end], high[begin:end], slant[n], 0.25 * vary[n]
-                bends = abs(own) + vary[n] <= spec[BENT]
-                for m in range(end - begin):
-                    run = math.sqrt((u[m] - px) * (u[m] - px) + (v[m] - py) * (v[m] - py))
-                    both, c = off + its_off[m], own - its[m]
-                    less = flat + swing * (both + sway)
-                    bent = (square + both * both) * each
-                    less = min(less, bent) if bends else less
-                    cost = sums[m] + a * run + min(c * lows[m], c * highs[m]) - less
-                    room[m] = cost if run + far[m] <= most else math.inf
-            else:
-                its_slant, its_vary = slant[begin:end], vary[begin:end]
-                for m in range(end - begin):
-                    run = math.sqrt((u[m] - px) * (u[m] - px) + (v[m] - py) * (v[m] - py))
-                    both, c = off + its_off[m], its[m] - own
-                    less = flat + 0.25 * its_vary[m] * (both + sway)
-                    bent = (square + both * both) * each
-                    less = min(less, bent) if abs(its[m]) + its_vary[m] <= spec[BENT] else less
-                    cost = sums[m] + its_slant[m] * run + min(c * up, c * down) - less
-                    room[m] = cost if run + far[m] <= most else math.inf
-            best, at = math.inf, -1
-            for m in range(end - begin):
-                if room[m] < best:
-                    best, at = room[m], m
-            if at >= 0:
-                value[n], near[n] = best, begin + at
+            for side in range(2):
+                m = nearest - side
+                while of0 <= m < of1:
+                    off = abs(aside[m] - aside[n])
+                    run = math.sqrt(flat * flat + off * off)
+                    if fewest + level * run > most:
+                        break
+                    if least[m] + level * run <= most:
+                        pairs += 1
+                        turn = step * (off + step) / math.sqrt(flat * flat + (off + step) * (off + step))
+                        q = 0
+                        while q < len(slope) and value[q, m] + slant[q] * run - beyond[q] * turn >= value[q, n]:
+                            q += 1
+                        if q < len(slope):
+                            _take_leg(value, near, m, n, run, turn, low[n], high[n], slope, slant, beyond)
+                    m += 1 - 2 * side
+            least[n] = -math.inf
+            for q in range(len(slope)):
+                least[n] = max(least[n], value[q, n] + min(slope[q] * low[n], slope[q] * high[n]))
+            if least[n] > most:
+                value[:, n], least[n] = NONE, math.inf
+            next_fewest = min(next_fewest, least[n])
+        fewest = next_fewest
+    return pairs

@@ -7,7 +7,6 @@ straight legs of that chain. docs/planner.md, "Sections", has the bound that fol
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -32,8 +31,8 @@ INSIDE_M = 0.05
 """Metres by which the circle of places within the track error, and the parts of sections in zones, are smaller."""
 ERROR_PLACES = np.array([(0.0, 0.0), (1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)])
 """Places within the track error whose ground counts, for a track error of 1."""
-NODE_MB = 3e-4
-"""Megabytes of a node."""
+NODE_MB = 8e-4
+"""Megabytes of a node, with its planes."""
 
 
 ChordZone = tuple[int, float, float, float, float, float]
@@ -59,11 +58,11 @@ class Line:
 class Sections:
     """The nodes of all sections from start to goal, terminals included.
 
-    ``first`` (S + 1,): a section's nodes are those from ``first[k]`` to ``first[k + 1]``. For each node (N,): its place
-    ``x``, ``y``; metres ``aside`` of the leg; ``low``, ``high``, between which and those of its neighbours straight
-    lines leave all legal altitudes; ``shut``: no legal place is nearer to it than its neighbours; ``loose``: the most
-    by which ``low`` or ``high`` differ from a neighbour's; straight metres from the start through the vias before it
-    (``away``), and to the goal (``left``). Nodes are ``step_m`` apart; tracks are at most ``most_m`` long.
+    ``first`` (S + 1,): a section's nodes are those from ``first[k]`` to ``first[k + 1]``; sections k and k + 1 are
+    ``gap[k]`` metres apart. For each node (N,): its place ``x``, ``y``; metres ``aside`` of the leg; ``low``, ``high``,
+    between which all legal altitudes near it lie: where a zone splits these, a place has two nodes or more; straight
+    metres from the start through the vias before it (``away``), and to the goal (``left``). Places are ``step_m``
+    apart.
     """
 
     lines: list[Line]
@@ -72,52 +71,40 @@ class Sections:
     y: Floats
     aside: Floats
     step_m: float
-    most_m: float
     low: Floats = field(init=False)
     high: Floats = field(init=False)
-    shut: Bools = field(init=False)
-    loose: Floats = field(init=False)
     away: Floats = field(init=False)
     left: Floats = field(init=False)
+    gap: Floats = field(init=False)
 
-    @property
-    def beside(self) -> Bools:
-        """(N - 1,) whether a node and the next one are of one section."""
-        same = np.ones(len(self.x) - 1, np.bool_)
-        same[self.first[1:-1] - 1] = False
-        return same
+    def rows(self) -> Int64s:
+        """The first nodes of all rows of neighbours, and the number of nodes."""
+        begins = np.append(np.abs(np.diff(self.aside, prepend=math.inf)) > 1.5 * self.step_m, True)
+        begins[self.first] = True
+        return np.flatnonzero(begins)
 
-    def widest(self, values: Floats) -> Floats:
-        """(N,) the most by which a value differs from that of a neighbour in the section."""
-        off = np.where(self.beside, np.abs(np.diff(values)), 0.0)
-        return np.asarray(np.maximum(np.append(off, 0.0), np.append(0.0, off)))
-
-    def touched(self, nodes: Bools) -> Bools:
-        """(N,) the given nodes (N,) and their neighbours in the section: a place is between two nodes."""
-        same, out = self.beside, nodes.copy()
-        out[:-1] |= nodes[1:] & same
-        out[1:] |= nodes[:-1] & same
-        return out
-
-    def nearest(self, aside_m: Floats) -> Int64s:
-        """(S,) the nodes nearest to places ``aside_m`` (S,) of the legs."""
-        first, last = self.first[:-1], self.first[1:] - 1
-        off = np.rint((aside_m - self.aside[first]) / self.step_m).astype(np.int64)
-        return np.asarray(np.clip(first + off, first, last))
+    def spans_of(self, nodes: Bools) -> SectionSpans:
+        """The parts of each section that lie between one of the given nodes (N,) and a neighbour."""
+        spans: SectionSpans = []
+        for line, begin, end in zip(self.lines, self.first[:-1], self.first[1:], strict=True):
+            aside = self.aside[begin:end][nodes[begin:end]]
+            off = 0.0 if line.leg is None else self.step_m
+            spans.append(_joined([(float(a) - off, float(a) + off) for a in aside]))
+        return spans
 
 
-SectionSpans = list[tuple[float, float]]
-"""Metres aside, least and greatest, that each section spans."""
+SectionSpans = list[list[tuple[float, float]]]
+"""Metres aside, from and to, of the parts of each section that count."""
 
 
-def lines_of(plane: PlaneSearch, spacing_m: float) -> list[Line]:
-    """The sections' lines, at most ``spacing_m`` apart, with the terminals between."""
+def lines_of(plane: PlaneSearch, spacing_m: float, halvings: int = 0) -> list[Line]:
+    """The sections' lines, at most ``spacing_m`` apart, and between them others by ``halvings``; with the terminals."""
     start = plane.legs[0].start
     lines, begin = [Line(None, *start.place, (0.0, 0.0), 0.0)], 0.0
     for leg in plane.legs:
         (x0, y0), (x1, y1), length = leg.start.place, leg.goal.place, leg.straight_m
         across = (y0 - y1) / length, (x1 - x0) / length
-        count = max(math.ceil(length / spacing_m), 1)
+        count = max(math.ceil(length / spacing_m), 1) << halvings
         for t in np.arange(1, count) / count:
             place = x0 + t * (x1 - x0), y0 + t * (y1 - y0)
             lines.append(Line(leg, *place, across, begin + t * length, _chords(leg.plane.shapes, place, across)))
@@ -129,7 +116,8 @@ def lines_of(plane: PlaneSearch, spacing_m: float) -> list[Line]:
 def widest_spans(plane: PlaneSearch, lines: list[Line], most_m: float) -> SectionSpans:
     """How far aside tracks of at most ``most_m`` metres may cross each line: within an ellipse around each leg."""
     straight_m = sum(leg.straight_m for leg in plane.legs)
-    spans, begin = [], 0.0
+    spans: SectionSpans = []
+    begin = 0.0
     for line in lines:
         wide = 0.0
         if line.leg is None:
@@ -138,33 +126,65 @@ def widest_spans(plane: PlaneSearch, lines: list[Line], most_m: float) -> Sectio
             half, middle = 0.5 * (most_m - straight_m + line.leg.straight_m), 0.5 * line.leg.straight_m
             flat = 1.0 - ((line.along_m - begin - middle) / half) ** 2
             wide = math.sqrt(max(half * half - middle * middle, 0.0) * max(flat, 0.0))
-        spans.append((-wide, wide))
+        spans.append([(-wide, wide)])
     return spans
 
 
-def lay_out(
-    plane: PlaneSearch, lines: list[Line], spans: SectionSpans, step_m: float, most_m: float
-) -> Sections | None:
-    """The nodes over spans of the lines, ``step_m`` apart; None if there is unknown ground among them."""
-    counts = [
-        (0, 0) if line.leg is None else (math.floor(a / step_m), math.ceil(b / step_m))
-        for line, (a, b) in zip(lines, spans, strict=True)
+def spans_within(spans: SectionSpans, widest: SectionSpans) -> SectionSpans:
+    """The parts of spans that lie within the widest."""
+    return [
+        [(max(a, low), min(b, high)) for a, b in parts if a <= high and b >= low]
+        for parts, ((low, high),) in zip(spans, widest, strict=True)
     ]
-    sizes = np.array([b - a + 1 for a, b in counts])
-    aside = np.concatenate([np.arange(a, b + 1) for a, b in counts]) * step_m
+
+
+def halved_spans(made: Sections, nodes: Bools, spare_m: float, least_slope: float) -> SectionSpans:
+    """`Sections.spans_of`, with a line more between every two sections of a leg, and where a path may cross it first.
+
+    ``spare_m``: how much longer than straight, or than its climb needs, a level path may be from section to section;
+    ``least_slope``: of the climb limits.
+    """
+    spans = made.spans_of(nodes)
+    out = [spans[0]]
+    for k, gap_m in enumerate(made.gap.tolist()):
+        this, other = (
+            np.arange(made.first[n], made.first[n + 1])[nodes[made.first[n] : made.first[n + 1]]] for n in (k, k + 1)
+        )
+        between: list[tuple[float, float]] = []
+        if len(this) and len(other):
+            rise_m = max(float(made.high[b].max() - made.low[a].min()) for a, b in ((this, other), (other, this)))
+            more_m = spare_m * math.hypot(gap_m, rise_m) / gap_m + max(rise_m / least_slope - gap_m, 0.0)
+            off_m = 0.5 * math.sqrt((gap_m + more_m) ** 2 - gap_m * gap_m)
+            both = [*spans[k], *spans[k + 1]]
+            between = [(min(a for a, _ in both) - off_m, max(b for _, b in both) + off_m)]
+        out += [between, spans[k + 1]]
+    return out
+
+
+def lay_out(plane: PlaneSearch, lines: list[Line], spans: SectionSpans, step_m: float) -> Sections | None:
+    """The nodes over spans of the lines, ``step_m`` apart; None if there is unknown ground among them."""
+    places = [_places(line, parts, step_m) for line, parts in zip(lines, spans, strict=True)]
+    sizes = np.array([len(part) for part in places])
+    aside = np.concatenate(places)
     middle = np.repeat(np.array([(line.east_m, line.north_m) for line in lines]), sizes, axis=0)
     across = np.repeat(np.array([line.across for line in lines]), sizes, axis=0)
     x, y = np.ascontiguousarray((middle + aside[:, None] * across).T)
     first = np.concatenate([np.zeros(1, np.int64), np.cumsum(sizes, dtype=np.int64)])
-    made = Sections(lines, first, x, y, aside, step_m, most_m + 4.0 * step_m)
-    if not _lay_heights(plane, made):
+    made = Sections(lines, first, x, y, aside, step_m)
+    if not _lay_heights(plane, made) or not _split_by_zones(plane, made):
         return None
     _lay_distances(plane, made)
-    made.shut = ~made.touched(made.low <= made.high)
-    for part, over, below in _in_zones(plane, made):
-        made.shut[part] |= over & below
-    made.loose = np.maximum(made.widest(made.low), made.widest(made.high))
     return made
+
+
+def _places(line: Line, parts: list[tuple[float, float]], step_m: float) -> Floats:
+    """Metres aside of the nodes of a line: all parts lie between two neighbours."""
+    if line.leg is None or not parts:
+        return np.zeros(len(parts))
+    begin = math.floor(parts[0][0] / step_m)
+    aside = np.arange(begin, max(math.ceil(parts[-1][1] / step_m), begin + 1) + 1) * step_m
+    near = np.any([(aside > a - step_m) & (aside < b + step_m) for a, b in parts], axis=0)
+    return np.asarray(aside[near], np.float64)
 
 
 def _lay_heights(plane: PlaneSearch, made: Sections) -> bool:
@@ -179,7 +199,7 @@ def _lay_heights(plane: PlaneSearch, made: Sections) -> bool:
     beside = np.ascontiguousarray((places @ surface.grid.jacobian(*problem.start[:2]).T)[:, ::-1])
     made.low, made.high = np.empty(len(made.x)), np.full(len(made.x), plane.top_m + _spare_m(plane))
     up, down = heights_above_ground(plane)
-    over = made.first, row, col, beside
+    over = made.rows(), row, col, beside
     if not lay_sections(surface.top_m, 1.0, down, -math.inf, *over, made.low):
         return False
     if math.isfinite(up):
@@ -211,30 +231,50 @@ def _lay_distances(plane: PlaneSearch, made: Sections) -> None:
     terminal = np.array([line.leg is None for line in made.lines])
     leg = np.repeat(np.maximum(np.cumsum(terminal) - terminal, 1) - 1, np.diff(made.first))
     made.away = sums[leg] + np.hypot(made.x - ends[leg, 0], made.y - ends[leg, 1])
+    made.gap = np.diff([line.along_m for line in made.lines])
     made.left = sums[-1] - sums[leg + 1] + np.hypot(made.x - ends[leg + 1, 0], made.y - ends[leg + 1, 1])
 
 
-def _in_zones(plane: PlaneSearch, made: Sections) -> Iterator[tuple[slice, Bools | bool, Bools | bool]]:
-    """Nodes between two neighbours in one zone; and whether it reaches above their ceilings, and below their floors."""
-    up, down = heights_above_ground(plane)
-    for k, line in enumerate(made.lines):
-        begin, end = int(made.first[k]), int(made.first[k + 1])
-        if line.leg is None or end - begin < 3:
-            continue
+def _split_by_zones(plane: PlaneSearch, made: Sections) -> bool:
+    """Split nodes where a zone forbids altitudes all the way from one neighbour to the other, and drop nodes without
+    any altitude. Returns False if ground that a zone's level follows is not known."""
+    follow = any(levels[3] or levels[4] for line in made.lines for levels in line.chords)
+    lowest = highest = np.zeros(len(made.x))
+    if follow:
+        surface, here = plane.problem.airspace.surface, np.zeros((1, 2))
+        col, row = np.ascontiguousarray(surface.grid(made.x, made.y).T)
+        lowest, highest = np.empty(len(made.x)), np.empty(len(made.x))
+        for sign, out in ((1.0, lowest), (-1.0, highest)):
+            if not lay_sections(surface.ground_m, sign, 0.0, -math.inf, made.rows(), row, col, here, out):
+                return False
+        highest *= -1.0
+    nodes, lows, highs, far_m = [], [], [], made.step_m + INSIDE_M
+    for line, begin, end in zip(made.lines, made.first[:-1].tolist(), made.first[1:].tolist(), strict=True):
+        at, low, high = np.arange(begin, end), made.low[begin:end], made.high[begin:end]
         for (_, bottom, top, bottom_agl, top_agl, thin), parts in line.chords.items():
-            if not (math.isinf(top) or math.isinf(bottom) or (bottom_agl == top_agl and top - bottom > thin)):
-                continue
             for a, b in parts:
-                m = math.ceil((a + INSIDE_M - made.aside[begin]) / made.step_m) + 1
-                n = math.floor((b - INSIDE_M - made.aside[begin]) / made.step_m)
-                first, last = begin + max(m, 1), begin + min(n, end - begin - 1)
-                if first < last:
-                    low, high = (v[first - 1 : last + 1] for v in (made.low, made.high))
-                    highest = np.maximum(np.maximum(high[:-2], high[1:-1]), high[2:])
-                    lowest = np.minimum(np.minimum(low[:-2], low[1:-1]), low[2:])
-                    over = top >= up if top_agl else top >= highest
-                    below = bottom <= down if bottom_agl else bottom <= lowest
-                    yield slice(first, last), over, below
+                floor_m = bottom + (highest[at] if bottom_agl else 0.0)
+                ceiling_m = top + (lowest[at] if top_agl else 0.0)
+                inside = (made.aside[at] >= a + far_m) & (made.aside[at] <= b - far_m)
+                cut = inside & (ceiling_m - floor_m > thin) & (floor_m < high) & (ceiling_m > low)
+                if cut.any():
+                    below, above = cut & (low <= floor_m), cut & (ceiling_m <= high)
+                    kept = np.concatenate([np.flatnonzero(part) for part in (~cut, below, above)])
+                    floor_m, ceiling_m = (np.broadcast_to(v, at.shape) for v in (floor_m, ceiling_m))
+                    split = np.cumsum([(~cut).sum(), below.sum()])
+                    at, low, high = at[kept], low[kept].copy(), high[kept].copy()
+                    high[split[0] : split[1]] = floor_m[below]
+                    low[split[1] :] = ceiling_m[above]
+        some = np.flatnonzero(low <= high)
+        some = some[np.argsort(at[some], kind="stable")]
+        nodes.append(at[some])
+        lows.append(low[some])
+        highs.append(high[some])
+    made.first = np.cumsum([0, *(len(part) for part in nodes)], dtype=np.int64)
+    node = np.concatenate(nodes)
+    made.x, made.y, made.aside = made.x[node], made.y[node], made.aside[node]
+    made.low, made.high = np.concatenate(lows), np.concatenate(highs)
+    return True
 
 
 def _chords(shapes: Shapes, place: tuple[float, float], across: tuple[float, float]) -> Chords:
@@ -277,24 +317,4 @@ def _joined(parts: list[tuple[float, float]]) -> list[tuple[float, float]]:
             out[-1] = out[-1][0], max(out[-1][1], b)
         else:
             out.append((a, b))
-    return out
-
-
-def crossings(plane: PlaneSearch, lines: list[Line], points: Floats) -> Floats:
-    """(S,) metres aside of the legs at which a path (N, 3) first crosses each line; 0 at terminals."""
-    out, at = np.zeros(len(lines)), 0
-    for leg in plane.legs:
-        a, b = np.array(leg.start.place), np.array(leg.goal.place)
-        ahead = (b - a) / leg.straight_m
-        last = at + int(np.argmin(np.hypot(*(points[at:, :2] - b).T)))
-        off = points[at : last + 1, :2] - a
-        own = [k for k, line in enumerate(lines) if line.leg is leg]
-        if own and len(off) > 1:
-            along, aside = off @ ahead, off @ [-ahead[1], ahead[0]]
-            where = np.array([(lines[k].east_m, lines[k].north_m) for k in own]) - a
-            where = np.minimum(where @ ahead, along.max())
-            after = np.maximum(np.searchsorted(np.maximum.accumulate(along), where), 1)
-            part = (where - along[after - 1]) / np.maximum(along[after] - along[after - 1], 1e-9)
-            out[own] = aside[after - 1] + np.clip(part, 0.0, 1.0) * (aside[after] - aside[after - 1])
-        at = last
     return out

@@ -1,201 +1,223 @@
 """Chains of places on sections across the legs: a bound, and paths along the cheapest chains.
 
-Each node of a section has a price: metres or joules for each metre that a path rises after it. With prices, altitudes
-count at single nodes, each at its floor or its ceiling; so the cheapest chain is found in the plane. Any prices give a
-bound. The best are those of the taut string over the cheapest chain: so chain and prices are found in turn, first with
-few nodes, then with many. docs/planner.md, "Sections", has the proof.
+At each node, the least cost of a path to it is bounded at every altitude by planes of some slopes. docs/planner.md,
+"Sections", has the proof. The places that no cheaper path can pass are left out, and the others looked at more closely.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
-from gcsplan.arrays import Floats, Int32s, Int64s
+from gcsplan.arrays import Bools, Floats, Int64s
 from gcsplan.planners.optimal.loop.search import Search, Size
 from gcsplan.planners.optimal.loop.workspace import Workspace
-from gcsplan.planners.optimal.plane.plane_search import PlaneSearch
-from gcsplan.planners.optimal.plane.section_kernels import cheapest_chain
-from gcsplan.planners.optimal.plane.section_prices import Prices, chain_prices, numbers, slants
+from gcsplan.planners.optimal.plane.section_kernels import NONE, cheapest_chains
 from gcsplan.planners.optimal.plane.sections import (
     NODE_MB,
-    Line,
     Sections,
-    SectionSpans,
-    crossings,
+    halved_spans,
     lay_out,
     lines_of,
+    spans_within,
     widest_spans,
 )
+from gcsplan.planners.problem import Problem
 
-SPACING_M, LEAST_SECTIONS = 120.0, 8
-"""Metres between sections, but at least so many of them on the straight way."""
-EFFORTS = ((5e5, 20), (2e6, 12), (8e6, 2))
-"""Legs between nodes that are looked at for one chain, at most, and how many chains: few nodes to find prices, then
-more to bound."""
-WORTH_MORE = 0.05
-"""Part of the gap that an effort must close for the next one to follow."""
-FINE = 0.05
-"""Metres between nodes, as a part of the spacing, from which on more nodes and a better path change little."""
+SPACING_M, LEAST_SECTIONS = 240.0, 8
+"""Metres between the first sections, but at least so many of them on the straight way."""
+LOOKS = ((1e6, 0), (4e6, 0), (6e6, 1), (1.2e7, 2))
+"""Legs between nodes that are looked at, at most, and how often the spacing was halved."""
+WORTH_MORE = 0.03
+"""Part of the gap that a look must close for the next one to follow."""
 NEARER_PATH = 0.7
 """Part of the gap it left, to which a better path must have closed it for another run."""
-LEAST_STEP, MOST_STEP = 1.0 / 80.0, 0.4
+LEAST_STEP, MOST_STEP = 1.0 / 40.0, 1.0
 """Least and most metres between nodes, as parts of the spacing."""
-WORTH, IDLE = 0.02, 4
-"""Part of the gap that a chain must close to count as a gain; and chains without a gain after which no more follow."""
-LEG_S = 1e-8
+LEG_S = 3e-8
 """Counted seconds of a leg between nodes."""
-CHEAPER = 1e-4
-"""Part of the cost by which a chain must be cheaper than the best path to be tried as a track."""
+LEVEL_SLOPES, STEEPEST = (0.03, 0.07, 0.12, 0.18, 0.26, 0.36, 0.5), 1.0
+"""Prices of a metre of climb in metres of track, and the slope from which on a climb limit does not count."""
+BEYOND = (0.1, 0.4, 1.0)
+"""Prices of a metre of climb beyond the limit: parts of the way from its price to the price of laps."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Planes:
+    """The planes (Q,) below the cost of a leg: ``slope`` for each metre that it rises, in rising order, and ``slant``
+    for each metre of its track; ``beyond``: what a plane beyond the climb limit loses for each metre of track that
+    rounding may take. ``level``: the cost of a level metre."""
+
+    slope: Floats
+    slant: Floats
+    beyond: Floats
+    level: float
+
+    @classmethod
+    def of(cls, problem: Problem) -> Planes:
+        """The planes of a problem's objective and climb limits."""
+        limits = problem.bound_limits
+        up, down = (_side(problem, k) for k in (limits.max_climb_slope, limits.max_descent_slope))
+        slope, slant, beyond = (
+            np.concatenate([b[:0:-1] * sign, a]) for a, b, sign in zip(up, down, (-1, 1, 1), strict=True)
+        )
+        return cls(slope, slant, beyond, float(slant.max()))
+
+
+def _side(problem: Problem, limit: float) -> tuple[Floats, Floats, Floats]:
+    """The planes of one climb limit (a slope), from level flight on."""
+    # The slope is raised by the rounding of its angle, so that a path exactly at the limit counts.
+    k = min(limit, STEEPEST) + 2e-8
+    beyond = np.array(BEYOND if limit < STEEPEST else ())
+    if problem.objective == "energy":
+        level, climb = problem.horizontal_j_per_m, problem.vertical_j_per_m
+        slope = np.concatenate([[0.0, 0.5 * climb, climb], climb + beyond * level / k])
+        over = np.maximum(slope - climb, 0.0)
+        return slope, level - k * over, k * over
+    flat, sine = 1.0 / math.hypot(1.0, k), k / math.hypot(1.0, k)
+    legal = [0.0, *(price for price in LEVEL_SLOPES if price < 0.9 * sine), sine]
+    slope = np.concatenate([legal, sine + beyond * (1.0 / sine - sine)])
+    over = np.maximum(slope - sine, 0.0)
+    return slope, np.where(over > 0.0, flat - k * over, np.sqrt(1.0 - np.minimum(slope, sine) ** 2)), k * over
 
 
 class SectionChains(Search):
-    """Under a maximum AGL, when a path is known; after a much better one again, unless nodes were near each other
-    already. Remembers prices, the last effort, whether nodes were, and the gap that it left."""
+    """Under a maximum AGL, when a path is known; after a much better one again."""
 
     NAME, IMPROVES, SHARE, AGAIN = "sections", "paths, bounds", 0.8, True
 
     def __init__(self, work: Workspace) -> None:
         super().__init__(work)
-        self._prices, self._effort, self._fine, self._left = Prices(), 0, False, math.inf
+        self._left = math.inf
+        """The gap that the last run left."""
 
     def applies(self) -> bool:
         """Under a maximum AGL, when a path is known."""
-        if self.problem.limits.max_agl_m is None or self.incumbent.best is None or self._fine:
+        if self.problem.limits.max_agl_m is None or self.incumbent.best is None:
             return False
         return self.incumbent.gap < NEARER_PATH * self._left
 
     def size(self) -> Size:
-        """Chains over few nodes; those over many are only looked for while they close the gap."""
-        legs, chains = EFFORTS[self._effort]
-        return legs * chains * LEG_S, self.work.plane.size(1.0)[1] + legs / 50.0 * NODE_MB
+        """The first look; the next ones follow only while they close the gap."""
+        return LOOKS[0][0] * LEG_S, self.work.plane.size(1.0)[1] + LOOKS[-1][0] / 100.0 * NODE_MB
 
     def run(self) -> None:
-        """Raise the bound, and try cheaper chains as tracks, with more nodes each time."""
+        """Raise the bound, and try the cheapest chains as tracks, with more nodes each time."""
         plane, incumbent = self.work.plane, self.incumbent
         if incumbent.best is None or not plane.legs or not plane.reach_longest() or math.isinf(plane.longest()):
             return
-        spacing_m = min(SPACING_M, sum(leg.straight_m for leg in plane.legs) / LEAST_SECTIONS)
-        lines, spans = lines_of(plane, spacing_m), None
-        for effort in range(self._effort, len(EFFORTS)):
+        planes, looked = Planes.of(self.problem), None
+        for pairs, halvings in LOOKS:
             gap = incumbent.cost - incumbent.bound
-            chains = _Chains(plane, self._prices, lines, spacing_m, effort, spans)
-            if chains.sections is not None:
-                self._effort = effort
-                chains.run()
-                if not math.isfinite(chains.bound):
-                    incumbent.raise_bound(math.inf)
-                    return
-                self._fine = chains.sections.step_m <= FINE * spacing_m
-                self._left = incumbent.gap
-                gained = gap - (incumbent.cost - incumbent.bound)
-                ends = effort + 1 == len(EFFORTS) or (effort > 0 and (self._fine or gained < WORTH_MORE * gap))
-                if ends or not incumbent.goes_on():
-                    return
-                spans = chains.spans_left()
+            sections = self._laid_out(planes, looked, pairs, halvings)
+            if sections is None:
+                break
+            halved = looked is not None and len(sections.lines) > len(looked.sections.lines)
+            looked = _Look(planes, sections, incumbent.cost)
+            incumbent.budget.spend("section", looked.pairs)
+            if math.isfinite(looked.bound):
+                self._try(sections, looked.chain())
+            incumbent.raise_bound(looked.bound)
+            little = gap - (incumbent.cost - incumbent.bound) < WORTH_MORE * gap
+            if not incumbent.goes_on() or (halved and little):
+                break
+        self._left = incumbent.gap
 
-
-class _Chains:
-    """Chains over one set of nodes. ``bound``: the highest bound so far."""
-
-    def __init__(
-        self, plane: PlaneSearch, prices: Prices, lines: list[Line], spacing_m: float, effort: int,
-        spans: SectionSpans | None,
-    ) -> None:  # fmt: skip
-        self.plane, self.incumbent, self.problem = plane, plane.incumbent, plane.problem
-        self.prices, self.bound = prices, 0.0
-        self.legs, self.most_chains = EFFORTS[effort]
+    def _laid_out(self, planes: Planes, looked: _Look | None, pairs: float, halvings: int) -> Sections | None:
+        """The nodes of the next look, over what the last one left; None if they are too far apart, or lie over unknown
+        ground."""
+        plane, incumbent = self.work.plane, self.incumbent
         straight_m, most_m = sum(leg.straight_m for leg in plane.legs), plane.longest()
-        within = widest_spans(plane, lines, most_m)
-        if spans is not None:
-            within = [(max(a, c), min(b, d)) for (a, b), (c, d) in zip(within, spans, strict=True)]
+        first_m = min(SPACING_M, straight_m / LEAST_SECTIONS)
+        spacing_m = first_m / (1 << halvings)
+        lines = lines_of(plane, first_m, halvings)
+        spans = widest = widest_spans(plane, lines, most_m)
+        if looked is not None:
+            incumbent.budget.spend("section", looked.pairs)
+            nodes = looked.nodes_left(incumbent.cost)
+            if len(lines) > len(looked.sections.lines):
+                limits = self.problem.bound_limits
+                least = min(limits.max_climb_slope, limits.max_descent_slope)
+                spare_m = (incumbent.cost - looked.bound) / planes.level
+                spans = halved_spans(looked.sections, nodes, spare_m, least)
+            else:
+                spans = looked.sections.spans_of(nodes)
+            spans = spans_within(spans, widest)
+            if not all(spans):
+                return None
         # Between two sections, a track gets aside by no more than what its metres to spare allow.
         window_m = 2.0 * math.sqrt((spacing_m + most_m - straight_m) ** 2 - spacing_m**2)
-        wide_m = np.array([b - a for a, b in within])
-        step_m = math.sqrt(float((wide_m * np.minimum(wide_m, window_m)).sum()) / self.legs)
-        self.sections: Sections | None = None
-        if step_m <= MOST_STEP * spacing_m:
-            self.sections = lay_out(plane, lines, within, max(step_m, LEAST_STEP * spacing_m), most_m)
+        wide_m = np.array([sum(b - a for a, b in parts) for parts in spans])
+        step_m = math.sqrt(float((wide_m * np.minimum(wide_m, window_m)).sum()) / pairs)
+        if step_m > MOST_STEP * spacing_m:
+            return None
+        return lay_out(plane, lines, spans, max(step_m, LEAST_STEP * spacing_m))
 
-    def run(self) -> None:
-        """Find chain and prices in turn until the bound gains no more; then try the cheapest chain as a track."""
-        sections, incumbent = self.sections, self.incumbent
-        assert sections is not None
-        assert incumbent.best is not None
-        if not self.prices.price:
-            self._learn(sections.nearest(crossings(self.plane, sections.lines, incumbent.best)))
-        idle, last, cheapest, least = 0, 0.0, None, incumbent.cost * (1.0 - CHEAPER)
-        for _ in range(self.most_chains):
-            price = self.prices.at(sections)
-            value, before = self._swept(price, back=False)
-            incumbent.budget.spend("section", self.legs)
-            found, gap = float(value[-1]), incumbent.cost - incumbent.bound
-            idle = 0 if found - last > WORTH * gap else idle + 1
-            self.bound, last = max(self.bound, found), found
-            if not math.isfinite(found):
-                return
-            incumbent.raise_bound(found)
-            nodes = _chain(before)
-            cost = self._learn(nodes)
-            if cost < least:
-                cheapest, least = nodes, cost
-            if idle >= IDLE or not incumbent.goes_on():
-                break
-        if cheapest is not None:
-            self._try(cheapest)
-
-    def spans_left(self) -> SectionSpans:
-        """What is left of each section without the places that no cheaper path can pass."""
-        sections = self.sections
-        assert sections is not None
-        price = self.prices.at(sections)
-        through = self._swept(price, back=False)[0] + self._swept(price, back=True)[0]
-        near = sections.touched(through <= self.incumbent.cost)
-        spans: SectionSpans = []
-        for begin, end in zip(sections.first[:-1], sections.first[1:], strict=True):
-            aside = sections.aside[begin:end][near[begin:end]]
-            spans.append((float(aside.min()), float(aside.max())) if len(aside) else (0.0, 0.0))
-        return spans
-
-    def _swept(self, price: Floats, *, back: bool) -> tuple[Floats, Int32s]:
-        """`cheapest_chain` at these prices."""
-        s, problem = self.sections, self.problem
-        assert s is not None
-        price = price.copy()
-        price[-1] = 0.0
-        slant = slants(problem, price)
-        spec = np.array([s.step_m, s.most_m, *numbers(problem), back])
-        value, near = np.empty(len(price)), np.empty(len(price), np.int32)
-        end = -1 if back else 0
-        value[end], near[end] = (0.0 if back else -price[0] * s.low[0]), -1
-        cheapest_chain(
-            s.first, s.x, s.y, s.low, s.high, s.shut, s.loose, price, slant, s.widest(price), s.away, s.left, spec,
-            np.empty(int(np.diff(s.first).max())), value, near,
-        )  # fmt: skip
-        return value, near
-
-    def _learn(self, nodes: Int64s) -> float:
-        """Add the prices of a chain; return its cost."""
-        assert self.sections is not None
-        price, cost = chain_prices(self.problem, self.sections, nodes)
-        self.prices.add(self.sections.aside[nodes], price)
-        return cost
-
-    def _try(self, nodes: Int64s) -> None:
+    def _try(self, sections: Sections, nodes: Int64s) -> None:
         """Try a chain as a track."""
-        sections = self.sections
-        assert sections is not None
-        terminal = np.array([line.leg is None for line in sections.lines])
+        terminal = np.repeat([line.leg is None for line in sections.lines], np.diff(sections.first))[nodes]
         fixed = terminal & (sections.low[nodes] == sections.high[nodes])
         fixed[[0, -1]] = False
         track = np.stack([sections.x[nodes], sections.y[nodes]], axis=-1)
         self.incumbent.take_along((track, terminal, np.where(fixed, sections.low[nodes], math.nan)))
 
 
-def _chain(before: Int32s) -> Int64s:
-    """The chain that ends with the last node, from the node before each."""
-    nodes = [len(before) - 1]
-    while before[nodes[-1]] >= 0:
-        nodes.append(int(before[nodes[-1]]))
-    return np.array(nodes[::-1], np.int64)
+class _Look:
+    """The cheapest chains over one set of nodes. ``bound``: of all paths that are cheaper than ``cost``."""
+
+    def __init__(self, planes: Planes, sections: Sections, cost: float) -> None:
+        self.planes, self.sections = planes, sections
+        # What rounding adds to the track, in expectation.
+        step_m = sections.step_m
+        self.less = planes.level * step_m**2 / 8.0 * float((1.0 / sections.gap).sum())
+        self.most = cost + self.less
+        self.value, self.near, self.pairs = self._swept(back=False)
+        low, high = sections.low[-1], sections.high[-1]
+        ends = self.value[:, -1] + np.minimum(planes.slope * low, planes.slope * high)
+        self.bound = float(ends.max()) - self.less if self.value[0, -1] < NONE else math.inf
+
+    def _swept(self, *, back: bool) -> tuple[Floats, Floats, int]:
+        """`cheapest_chains` to each node, or from it to the last one: values, nodes before, and legs."""
+        s, planes = self.sections, self.planes
+        turn = slice(None, None, -1 if back else 1)
+        first = (len(s.x) - s.first[turn]) if back else s.first
+        nodes = (s.aside, s.low, s.high, s.away if back else s.left)
+        slope = -planes.slope if back else planes.slope
+        value, near = np.full((len(slope), len(s.x)), NONE), np.full((len(slope), len(s.x)), -1.0)
+        aside, low, high, left, gap, slope, slant, beyond = (
+            np.ascontiguousarray(v[turn]) for v in (*nodes, s.gap, slope, planes.slant, planes.beyond)
+        )
+        value[:, 0] = -slope * low[0]
+        spec, least = np.array([s.step_m, planes.level, self.most]), np.empty(len(s.x))
+        pairs = cheapest_chains(
+            np.ascontiguousarray(first), gap, aside, low, high, left, slope, slant, beyond, spec, least, value, near
+        )
+        return value[turn, turn], near, pairs
+
+    def chain(self) -> Int64s:
+        """The nodes of the chain that decides the bound."""
+        s, planes = self.sections, self.planes
+        nodes = [len(s.x) - 1]
+        q = int((self.value[:, -1] + planes.slope * s.low[-1]).argmax())
+        while (m := int(self.near[q, nodes[-1]])) >= 0:
+            n = nodes[-1]
+            run = math.hypot(s.x[n] - s.x[m], s.y[n] - s.y[m])
+            plane = self.value[:, m] + planes.slant * run
+            q = int(np.clip(q, *((plane + planes.slope * at).argmax() for at in (s.low[n], s.high[n]))))
+            nodes.append(m)
+        return np.array(nodes[::-1], np.int64)
+
+    def nodes_left(self, cost: float) -> Bools:
+        """(N,) the nodes that a rounded chain of a path cheaper than ``cost`` may pass."""
+        s, slope = self.sections, self.planes.slope[:, None]
+        back = self._swept(back=True)[0]
+        through = (self.value + back).max(axis=0)
+        every = np.arange(len(s.x))
+        for at, rising in ((s.low, 1.0), (s.high, -1.0)):
+            to, of = self.value + slope * at, back - slope * at
+            i, j = to.argmax(axis=0), of.argmax(axis=0)
+            ends = rising * (slope[i, 0] - slope[j, 0]) >= 0.0
+            through = np.where(ends, to[i, every] + of[j, every], through)
+        return np.asarray(through <= cost + self.less)

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from gcsplan.planners.optimal.loop.workspace import Workspace
 from gcsplan.planners.optimal.plane.incumbent import Incumbent
 from gcsplan.planners.optimal.plane.sections import lay_out, lines_of, widest_spans
-from gcsplan.planners.optimal.searches.sections import SectionChains
+from gcsplan.planners.optimal.searches.sections import Planes, SectionChains
 from gcsplan.planners.optimal.searches.straight import Straight
 from gcsplan.planners.problem import Objective, Problem, Via
 from gcsplan.planners.profile.cross_sections import tightened
@@ -18,7 +21,7 @@ from gcsplan.world.airspace import Airspace
 from gcsplan.world.geometry.limits import Limits
 from gcsplan.world.geometry.path import Path
 from gcsplan.world.geometry.surface import GridMap, Surface
-from gcsplan.world.geometry.zones import Circle, Zone
+from gcsplan.world.geometry.zones import Circle, Level, Zone
 from tests.support.planner_worlds import faults
 from tests.support.searches import improve, looked, over_flat
 
@@ -26,7 +29,8 @@ POST_M = 40.0
 
 
 def hills(seed: int, objective: Objective = "length", climb_deg: float = 90.0, errors: bool = False) -> Problem:
-    """Over hills of some hundred metres, 3.4 km from west to east, 30 to 90 m above ground."""
+    """Over hills of some hundred metres, 3.4 km from west to east, 30 to 90 m above ground; the zone in the way has a
+    ceiling above ground if the seed is odd."""
     rng = np.random.default_rng(seed)
     n = 101
     x, y = np.meshgrid(np.arange(n) * POST_M, np.arange(n) * POST_M)
@@ -37,7 +41,8 @@ def hills(seed: int, objective: Objective = "length", climb_deg: float = 90.0, e
     surface = Surface(z, z, GridMap.affine(0.0, (n - 1) * POST_M, POST_M, POST_M))
     some = {"track_error_m": 3.0, "altitude_error_m": 4.0, "horizontal_clearance_m": 20.0} if errors else {}
     limits = Limits(30.0, 90.0, max_climb_deg=climb_deg, max_descent_deg=climb_deg, **some)
-    air = Airspace(surface, (Zone("disc", Circle(2000.0, 2100.0, 180.0)),))
+    lid = Level(60.0, "agl") if seed % 2 else None
+    air = Airspace(surface, (Zone("disc", Circle(2000.0, 2100.0, 180.0), None, lid),))
     (e0, n0), (e1, n1) = (300.0, 2000.0), (3700.0, 2000.0)
     low = air.floor_amsl(np.array([e0, e1]), np.array([n0, n1]), limits) + 5.0
     return Problem(air, limits, (e0, n0, float(low[0])), (e1, n1, float(low[1])), objective=objective)
@@ -111,4 +116,56 @@ def test_unknown_ground_among_the_nodes_leaves_no_sections() -> None:
     for air, known in ((Airspace(surface), False), (problem.airspace, True)):
         plane = looked(replace(problem, airspace=air)).plane
         lines = lines_of(plane, 120.0)
-        assert (lay_out(plane, lines, widest_spans(plane, lines, 3700.0), 20.0, 3700.0) is not None) == known
+        assert (lay_out(plane, lines, widest_spans(plane, lines, 3700.0), 20.0) is not None) == known
+
+
+def limited(objective: Objective, climb_deg: float, descent_deg: float) -> Problem:
+    """A problem with these climb limits."""
+    problem = over_flat(max_agl_m=120.0, objective=objective)
+    return replace(problem, limits=replace(problem.limits, max_climb_deg=climb_deg, max_descent_deg=descent_deg))
+
+
+def cost_of(problem: Problem, run: float, rise: float) -> float:
+    """The cost of the shortest path over ``run`` metres of track that rises ``rise`` metres within the climb limits."""
+    limits = problem.limits
+    longer = max(run, abs(rise) / (limits.max_climb_slope if rise > 0.0 else limits.max_descent_slope))
+    if problem.objective == "energy":
+        return problem.horizontal_j_per_m * longer + problem.vertical_j_per_m * abs(rise)
+    return math.hypot(longer, rise)
+
+
+@given(
+    st.sampled_from(["length", "energy"]), st.floats(5.0, 90.0), st.floats(5.0, 90.0), st.floats(0.0, 500.0),
+    st.floats(-500.0, 500.0),
+)  # fmt: skip
+def test_no_leg_is_cheaper_than_a_plane(
+    objective: Objective, climb_deg: float, descent_deg: float, run: float, rise: float
+) -> None:
+    problem = limited(objective, climb_deg, descent_deg)
+    planes = Planes.of(problem)
+    assert np.all(np.diff(planes.slope) > 0.0)
+    cost = float((planes.slant * run + planes.slope * rise).max())
+    assert cost <= cost_of(problem, run, rise) * (1.0 + 1e-6) + 1e-9
+    if run > 0.0 and abs(rise) < 0.5 * run:
+        assert cost >= cost_of(problem, run, rise) * (0.98 if objective == "length" else 0.95)
+
+
+@given(
+    st.sampled_from(["length", "energy"]), st.floats(5.0, 44.0), st.floats(-1.2, 1.2), st.floats(-150.0, 150.0),
+    st.floats(0.2, 12.0), st.floats(60.0, 240.0),
+)  # fmt: skip
+def test_a_rounded_leg_costs_no_more_in_expectation_than_the_leg_and_what_is_taken_off(
+    objective: Objective, climb_deg: float, slope: float, aside: float, step: float, gap: float
+) -> None:
+    problem = limited(objective, climb_deg, climb_deg)
+    planes = Planes.of(problem)
+    run, rise = math.hypot(gap, aside), slope * math.hypot(gap, aside)
+    for part in np.linspace(0.0, 1.0, 9):  # the rounded difference is a step more with this probability
+        expected = 0.0
+        for off, chance in ((-part * step, 1.0 - part), ((1.0 - part) * step, part)):
+            rounded = abs(aside + off)
+            turn = step * (rounded + step) / math.hypot(gap, rounded + step)
+            values = planes.slant * math.hypot(gap, rounded) + planes.slope * rise - planes.beyond * turn
+            expected += chance * float(values.max())
+        less = planes.level * step**2 / (8.0 * gap)
+        assert expected <= cost_of(problem, run, rise) * (1.0 + 1e-6) + less
