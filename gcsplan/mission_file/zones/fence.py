@@ -144,13 +144,19 @@ def _areas(found: ZoneFile, rows: Sequence[tuple[int, RawItem]]) -> None:
             words = (
                 f"a polygon of {first.params[0]:g} corners needs as many rows of command {first.command:g} that say so"
             )
+            before = len(found.problems)
             found.problems.append(Mistake(where, f"{words}; {len(same)} follow each other. Is the file whole?"))
+            if _KINDS[int(first.command)]:
+                found.refuse_since(before)
             k += len(same)
         else:
             corners = [(item.x, item.y) for item in same[:count]]
             _add(found, name, where, corners, inside=_KINDS[int(first.command)])
             k += count
     _returns(found, returns)
+    inside = sum(draft.keep_in for draft in found.zones)
+    if inside > 1:
+        found.own_notes.append(Note("fence_areas_joined", count=inside))
 
 
 def _returns(found: ZoneFile, count: int) -> None:
@@ -161,9 +167,12 @@ def _returns(found: ZoneFile, count: int) -> None:
 def _add(
     found: ZoneFile, name: str, where: str, corners: list[Corner], *, inside: bool, radius_m: float | None = None
 ) -> None:
-    """Add an area; one that the aircraft stays ``inside`` is a keep-in area."""
+    """Add an area; one that the aircraft stays ``inside`` is a keep-in area, and is never left out."""
+    before = len(found.problems)
     stated = ZoneStatements(name, radius_m, Bounds(), (), False, keep_in=inside)
     if radius_m is None:
         found.add_ring(stated, name, where, corners, "")
     else:
         found.add_circle(stated, name, where, corners[0])
+    if inside:
+        found.refuse_since(before)

@@ -132,6 +132,14 @@ class ZoneFile:
         self.problems[:0] = self.refusals
         self.refusals = []
 
+    def refuse_since(self, count: int) -> None:
+        """Make the problems after the first ``count`` refuse the file by every rule of ``on_bad``.
+
+        They are an area's to stay in: without it a flight may be anywhere.
+        """
+        self.refusals += self.problems[count:]
+        del self.problems[count:]
+
     def _counted(self, draft: ZoneDraft, on_bad: OnBad) -> ZoneDraft:
         """A zone that is not understood as it counts, with a remark; any other zone as it is."""
         if draft.unread and not draft.unused:
@@ -214,6 +222,7 @@ class ZoneFile:
         self, stated: ZoneStatements, part: str, where: str, key: str, holes: Sequence[Sequence[Corner]]
     ) -> None:
         """Add the holes of a polygon around the world: outside of them all is no-fly, so that flights stay inside."""
+        before = len(self.problems)
         if stated.bounds != Bounds() or stated.unread:
             words = "a polygon around the world is no-fly at all heights outside of its holes: leave its levels out"
             self.problems.append(Mistake(where, words))
@@ -221,6 +230,7 @@ class ZoneFile:
             name = part if len(holes) == 1 else f"{part}/{i + 1}"
             draft = polygon(name[:200], where, hole, Bounds(), self.problems, key=key)
             self.add(draft and replace(draft, keep_in=True, kept_by=f"{part} of {where}"), stated.remarks)
+        self.refuse_since(before)
 
     def add_circle(
         self, stated: ZoneStatements, part: str, where: str, centre: Corner, remarks: Sequence[Remark] = ()

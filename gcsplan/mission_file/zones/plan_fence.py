@@ -33,7 +33,7 @@ def read_plan_fence(path: Path, whole: Any) -> ZoneFile:
         raise InputError("the plan has no fence; draw one in QGroundControl, and save it", where=where)
     inside = 0
     while items:
-        first = items[0]
+        first, before = items[0], len(found.problems)
         name, is_circle = f"{path.stem}[{len(found.zones)}]", first.command in (CIRCLE_IN, CIRCLE_OUT)
         at = f"{where}: area {len(found.zones) + 1}"
         count = 1 if is_circle else int(first.params[0])
@@ -46,6 +46,8 @@ def read_plan_fence(path: Path, whole: Any) -> ZoneFile:
         is_inside = first.command in (CIRCLE_IN, POLYGON_IN)
         inside += is_inside
         found.add(draft and replace(draft, keep_in=is_inside, kept_by=str(path)), [])
+        if is_inside:
+            found.refuse_since(before)
         items = items[count:]
     if inside > 1:
         found.own_notes.append(Note("fence_areas_joined", count=inside))

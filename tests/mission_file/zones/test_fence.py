@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from gcsplan.errors import InputError
+from gcsplan.mission_file.published.policy import Policy
 from gcsplan.mission_file.zone_reader import read_zones
 from gcsplan.mission_file.zones.fence import is_fence, read_fence
 
@@ -107,6 +108,29 @@ def test_a_fence_of_places_is_known_and_named(tmp_path: Path, name: str, written
     except InputError as why:
         said = str(why)
     assert words in said
+
+
+def test_an_area_that_the_aircraft_stays_in_is_a_keep_in_area(tmp_path: Path) -> None:
+    inside = [(5001, 3, *corner) for corner in TRIANGLE]
+    places = HEAD + RETURN + CORNERS + FIRST
+    for name, text in (("a.waypoints", fence_rows(*inside)), ("a.fen", places), ("a.txt", places)):
+        path = tmp_path / name
+        path.write_text(text)
+        (draft,) = read_zones(path, where="zones").zones
+        assert (draft.keep_in, draft.points) == (True, tuple(TRIANGLE))
+    path = tmp_path / "a.waypoints"
+    path.write_text(fence_rows(*inside, *inside))
+    assert "fence_areas_joined" in [note.code for note in read_zones(path, where="zones").notes]
+
+
+def test_an_area_to_stay_in_that_is_not_whole_is_never_skipped(tmp_path: Path) -> None:
+    path = tmp_path / "a.waypoints"
+    crossed = [(5001, 4, 46.0, 14.0), (5001, 4, 46.1, 14.1), (5001, 4, 46.0, 14.1), (5001, 4, 46.1, 14.0)]
+    for bad in ([(5001, 3, 46.0, 14.0)], crossed, [(5003, 0, 46.0, 14.0)]):
+        path.write_text(fence_rows(*OUT, *bad))
+        assert read_zones(path, where="zones", policy=Policy(on_bad="skip")).problems
+    path.write_text(fence_rows(*OUT, (5004, 0, 46.0, 14.0)))
+    assert not read_zones(path, where="zones", policy=Policy(on_bad="skip")).problems
 
 
 @pytest.mark.parametrize(

@@ -47,5 +47,5 @@ def test_a_fence_that_is_not_read_as_a_whole_is_refused_with_its_place(whole: An
 def test_an_outline_that_crosses_itself_is_a_problem_at_its_area() -> None:
     crossed = {"polygon": [[46.0, 14.0], [46.01, 14.01], [46.01, 14.0], [46.0, 14.01]], "inclusion": True, "version": 1}
     found = read_plan_fence(Path("f.plan"), plan_of(polygons=[crossed]))
-    assert "crosses or touches itself" in found.problems[0].message
-    assert found.problems[0].where.startswith("f.plan: geoFence: area 1")
+    assert "crosses or touches itself" in found.refusals[0].message
+    assert found.refusals[0].where.startswith("f.plan: geoFence: area 1")
