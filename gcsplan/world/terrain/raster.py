@@ -291,8 +291,8 @@ def _unreadable(path: Path, why: Exception) -> str:
     hint = ""
     if _is_hgt(path):
         hint = (
-            "; an .hgt tile is named after its south-west corner (N36W085.hgt, or N36W085.hgt.zip or .hgt.gz with that "
-            "inside) and holds 1201 or 3601 posts a side"
+            "; an .hgt tile is named after its south-west corner (N36W085.hgt, N36W085.hgt.gz, or N36W085.hgt.zip with "
+            "that inside) and holds 1201 or 3601 posts a side"
         )
     elif path.suffix.lower() == ".zip":
         hint = "; unpack it first"
