@@ -2,6 +2,10 @@
 
 INPUT_TEXTS = {
     # -- how the keys of a mission file, and the options that stand for them, were read --
+    "change_of_key": "{option}: {key_path} is {now} in place of {was}",
+    "change_adds_key": "{option}: {key_path} is {now}, where nothing is given",
+    "change_adds_zone": "{option}: no_fly has {now}, too",
+    "change_of_zones": "{option}: {now} in place of {count} {count:entry|entries} of no_fly",
     "value_converted": "{given} {symbol}, read as {own_key}: {value}",
     "charge_converted": "{given} {symbol} at {volts:g} V, read as {own_key}: {value}",
     "key_read_as_another": "read as {own_key}",

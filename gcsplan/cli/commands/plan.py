@@ -11,6 +11,19 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from gcsplan.cli.arguments import completion
+from gcsplan.cli.arguments.changes import (
+    AvoidFileOption,
+    AvoidOption,
+    GoalOption,
+    MaxAglOption,
+    MinAglOption,
+    SaveOption,
+    SpeedOption,
+    StartOption,
+    ViaOption,
+    ZonesInsteadOption,
+    changes_of,
+)
 from gcsplan.cli.arguments.options import (
     LINKS,
     ArmedOption,
@@ -84,6 +97,16 @@ def plan(
     ] = None,
     planner: PlannerOption = None,
     objective: ObjectiveOption = None,
+    avoid: AvoidOption = None,
+    avoid_file: AvoidFileOption = None,
+    zones: ZonesInsteadOption = None,
+    max_agl: MaxAglOption = None,
+    min_agl: MinAglOption = None,
+    start: StartOption = None,
+    goal: GoalOption = None,
+    via: ViaOption = None,
+    speed: SpeedOption = None,
+    save: SaveOption = False,
     seed: SeedOption = None,
     encoding: EncodingOption = None,
     cost: CostOption = None,
@@ -150,6 +173,7 @@ def plan(
 ) -> None:
     """Plan a mission file, write its outputs, and upload and verify them on request.
 
+    Options such as --avoid, --max-agl or --goal change the mission for this run, and --save writes them into its file.
     Without --upload nothing is sent. The outputs are written whole or not at all. If no safe mission exists, earlier
     outputs are moved to DIR/previous, so that no old mission is flown by mistake. One vehicle without a mission refuses
     a whole fleet, unless it may be left out.
@@ -158,34 +182,37 @@ def plan(
     from gcsplan.app.fleet.may_fly import flyable
     from gcsplan.app.fleet.start_time import GateTime
     from gcsplan.app.output import files as outputs
-    from gcsplan.app.plan.way_home import is_required
     from gcsplan.cli.output.console import plan_table, release_table, remark, upload_table
     from gcsplan.cli.output.progress import planning_display
     from gcsplan.cli.output.verdict_table import say_homes
     from gcsplan.export.outdir import settle_outputs
     from gcsplan.mission_file.source import file_of
+    from gcsplan.notes.note import in_json
     from gcsplan.units import units_of
 
     system = units_of(units)
     if list_zones:
         return _list_zones(mission, system, upload, as_json, at)
     directory = Path(file_of(mission).stem) if out is None else out
+    changes = changes_of(
+        avoid, avoid_file, zones, {"max_agl_m": max_agl, "min_agl_m": min_agl}, {"start": start, "goal": goal}, via,
+        speed, terrain_keys(vertical_datum, height_unit, nodata),
+    )  # fmt: skip
     gate = None if gate_utc is None else GateTime.parse(gate_utc, datetime.now(UTC))
     each = _require_options(planner, objective, png, directory)
     if settle_outputs(directory):
         remark(f"an earlier run was cut off while it wrote to {directory}: the outputs before it were put back")
     source: MissionFile | None = None
     try:
-        read = terrain_keys(vertical_datum, height_unit, nodata)
         depart = None if gate is None else gate.start
-        source = pipeline.load_mission(mission, departure=depart, at=at, terrain=read)
+        source = pipeline.load_mission(mission, departure=depart, at=at, changes=changes)
+        keep = _keeping(source, mission, save=save)
         targets: dict[str, str] = {}
-        if upload or fence or fence_infinite:  # otherwise the upload modules need not be imported
-            from gcsplan.app.upload import fence as fencing
+        if upload:  # otherwise the upload modules need not be imported
             from gcsplan.app.upload import run as uploads
             from gcsplan.app.upload.job import UploadOptions
 
-            targets = uploads.targets(upload or [], [r.vehicle for r in source.vehicles])
+            targets = uploads.targets(upload, [r.vehicle for r in source.vehicles])
         names = [r.vehicle.name for r in source.vehicles]
         with planning_display(names, objective or source.planner.objective) as progress:
             planned = pipeline.plan(
@@ -196,13 +223,8 @@ def plan(
         planned, homes = flyable(
             planned, allow_unjudged=allow_unjudged, home=report or way_home or rally, require_way_home=require_way_home
         )
-        orders: list[UploadJob] = []
-        if upload or fence or fence_infinite:
-            where = targets or dict.fromkeys((v.name for v in planned.vehicles), "")
-            orders = uploads.jobs_of(planned, where, homes, is_required(source, require_way_home), rally=rally)
-        list_notes: Sequence[tuple[str, Note]] = ()
-        if orders:  # a fence that the mission would breach is refused before anything is written
-            orders, list_notes = fencing.with_lists(orders, fencing.ListsSent(fence, rally, fence_infinite))
+        lists = (fence, rally, fence_infinite)
+        orders, list_notes = _orders(planned, targets, homes, require_way_home, lists)
         fences = {job.name: job.fence.items for job in orders if job.fence is not None}
         files = outputs.outputs_of(planned, homes, fences, rally=rally)
         if report:
@@ -214,6 +236,7 @@ def plan(
         raise
     pictures = {} if png is None else _pictures(planned, png, each)
     _write(directory, files, pictures, later=["upload.json"] if targets else [])
+    keep()
     if not as_json:
         plan_table(planned, homes, system)
         say_homes(homes, system)
@@ -232,8 +255,49 @@ def plan(
     left_out = _left_out(planned, mission)
     failure = (uploads.failure(results) if targets else None) or left_out
     if as_json:
-        emit(outputs.summary_of(planned, results, homes), failure)
+        changed = in_json("changes", source.changes)
+        emit(outputs.summary_of(planned, results, homes) | changed, failure)
     raise typer.Exit(failure["code"] if failure is not None else 0)
+
+
+def _orders(
+    planned: Plan, targets: Mapping[str, str], homes: Mapping[str, WayHome], require_way_home: bool,
+    lists: tuple[bool, bool, bool],
+) -> tuple[list[UploadJob], Sequence[tuple[str, Note]]]:  # fmt: skip
+    """What is sent to each vehicle, with its ``lists`` (fence, rally points, infinite fence), and the notes on them.
+
+    A fence that the mission would breach is refused here, before anything is written.
+    """
+    fence, rally, infinite = lists
+    if not (targets or fence or infinite):
+        return [], ()
+    from gcsplan.app.plan.way_home import is_required
+    from gcsplan.app.upload import fence as fencing
+    from gcsplan.app.upload import run as uploads
+
+    where = targets or dict.fromkeys((v.name for v in planned.vehicles), "")
+    orders = uploads.jobs_of(planned, where, homes, is_required(planned.source, require_way_home), rally=rally)
+    return fencing.with_lists(orders, fencing.ListsSent(fence, rally, infinite)) if orders else ([], ())
+
+
+def _keeping(source: MissionFile, mission: Path, *, save: bool) -> Callable[[], None]:
+    """Say the changes of a mission; returns what saves them, if they are to be saved, once the plan is written."""
+    from gcsplan.cli.output.console import remark, say_notes
+    from gcsplan.mission_file.changes import saving
+
+    say_notes(source.changes)
+    if save:
+        assert source.content is not None
+        write = saving(source.content)
+
+        def keep() -> None:
+            write()
+            remark(f"the changes are written into {mission}")
+
+        return keep
+    if source.changes:
+        remark("note: changed for this run alone; --save writes it into the mission file")
+    return lambda: None
 
 
 def _add_results(
