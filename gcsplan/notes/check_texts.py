@@ -4,6 +4,18 @@ On the way home: from where a return is not safe and why, what to set, and which
 """
 
 CHECK_TEXTS = {
+    # -- the difference to an earlier mission of the same vehicle --
+    "difference_none": "nothing changed since {since}: the missions are equal, item for item",
+    "difference_of_items": "no leg moved since {since}; items differ",
+    "difference_of_path": "{moved} of {legs} {legs:leg|legs} moved since {since}, by {most_m:distance.0 up} at most",
+    "difference_not_measured": "how far the legs moved since {since} is not measured",
+    "moved_leg": "{by_m:distance.0 up}",
+    "more_moved_legs": "{count} more",
+    "difference_moved_legs": "moved farthest: {legs}",
+    "difference_new_note": "new: {note}",
+    "difference_gone_note": "no longer: {note}",
+    "difference_earlier_breaks": "{since} would break a limit now, or is not judged: {note}",
+    "last_plan_unread": "the last plan cannot be compared: {why}",
     # -- what an autopilot does with a mission's items, and on what of it is not judged --
     # -- home --------------------------------------------------------------------------------------------------------
     "home_ground_unknown": (

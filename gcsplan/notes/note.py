@@ -137,6 +137,20 @@ class Note:
         return _revived, (self.code, self.item, dict(self.data))
 
 
+def note_of(given: Any) -> Note | None:
+    """The note that `Note.as_dict` gave, also of JSON; None for another value, or a code of another version."""
+    try:
+        return Note(given["code"], given["item"], **{name: _datum(v) for name, v in given["data"].items()})
+    except (KeyError, TypeError, AttributeError):
+        return None
+
+
+def _datum(value: Any) -> Datum:
+    if isinstance(value, list):
+        return tuple(map(_datum, value))
+    return note_of(value) if isinstance(value, dict) else value
+
+
 def in_json(key: str, notes: Iterable[Note], wording: Wording = IN_FILES) -> dict[str, Any]:
     """A list of notes for programs: its sentences under ``key``, and under ``key_data`` what they are made of."""
     every = list(notes)

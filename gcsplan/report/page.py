@@ -105,7 +105,7 @@ def render_page(page: Page) -> str:
             briefing_html(page, _verdict(page), relief, marks), _header(page), _vehicles(page),
             f'<section><h2>Map</h2>{tools("map")}{map_html(page, lines, relief, marks, flown)}'
             f"{replay_html(replay, page) if replay else ''}</section>",
-            rehearsal_html(page), _scene(page, relief),
+            tables.differences_html(page), rehearsal_html(page), _scene(page, relief),
             *_profiles(page, lines, found, full), home, fleet, *_details(page, lines, found, full), _end(page),
         )
     )  # fmt: skip

@@ -11,6 +11,7 @@ import numpy as np
 from gcsplan.app.plan.model import Plan
 from gcsplan.app.upload.job import JobResult
 from gcsplan.app.upload.on_board import settings_of_plan
+from gcsplan.check.difference import PlanDifference
 from gcsplan.check.returns.verdict import WayHome
 from gcsplan.fleet.motion.timing import TimedPath
 from gcsplan.report.page import render_page
@@ -25,10 +26,14 @@ MOST_IN_ORDER = 100
 
 
 def render(
-    plan: Plan, results: Sequence[JobResult] = (), homes: Mapping[str, WayHome] | None = None, units: Units = METRIC
-) -> str:
-    """The report of ``plan`` as HTML text, with the results of its uploads. ``homes``: vehicle name to its way home."""
-    return render_page(page_of_plan(plan, results, homes, units))
+    plan: Plan, results: Sequence[JobResult] = (), homes: Mapping[str, WayHome] | None = None, units: Units = METRIC,
+    differences: Sequence[PlanDifference] = (),
+) -> str:  # fmt: skip
+    """The report of ``plan`` as HTML text, with the results of its uploads and the ``differences`` to earlier missions.
+
+    ``homes``: vehicle name to its way home.
+    """
+    return render_page(replace(page_of_plan(plan, results, homes, units), differences=tuple(differences)))
 
 
 def page_of_plan(

@@ -56,8 +56,10 @@ from gcsplan.errors import CheckFailed, InputError, NoMission, UsageError
 
 if TYPE_CHECKING:
     from gcsplan.app.fleet.start_time import GateTime
+    from gcsplan.app.plan.earlier import EarlierMission
     from gcsplan.app.plan.model import Plan
-    from gcsplan.app.upload.job import JobResult, UploadJob, UploadOptions
+    from gcsplan.app.upload.job import JobResult, UploadJob
+    from gcsplan.check.difference import PlanDifference
     from gcsplan.check.returns.verdict import WayHome
     from gcsplan.mission_file import MissionFile
     from gcsplan.notes.note import Note
@@ -128,6 +130,15 @@ def plan(
             "second. ArduCopter alone; needs --allow-unjudged, for nobody knows how long it will wait.",
         ),
     ] = None,
+    compare_to: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="WHERE",
+            autocompletion=completion.words("link"),
+            help="Say what changes to the missions on board, too: a URL for all vehicles, NAME=URL for one, or `link`. "
+            "Nothing is written to a vehicle.",
+        ),
+    ] = None,
     at: AtOption = None,
     report: Annotated[
         bool, typer.Option("--report", help="Also write report.html: map, profiles, way home, fleet; one page.")
@@ -182,9 +193,8 @@ def plan(
     from gcsplan.app.fleet.may_fly import flyable
     from gcsplan.app.fleet.start_time import GateTime
     from gcsplan.app.output import files as outputs
-    from gcsplan.cli.output.console import plan_table, release_table, remark, upload_table
+    from gcsplan.cli.output.console import release_table, remark, upload_table
     from gcsplan.cli.output.progress import planning_display
-    from gcsplan.cli.output.verdict_table import say_homes
     from gcsplan.export.outdir import settle_outputs
     from gcsplan.mission_file.source import file_of
     from gcsplan.notes.note import in_json
@@ -210,9 +220,9 @@ def plan(
         targets: dict[str, str] = {}
         if upload:  # otherwise the upload modules need not be imported
             from gcsplan.app.upload import run as uploads
-            from gcsplan.app.upload.job import UploadOptions
 
             targets = uploads.targets(upload, [r.vehicle for r in source.vehicles])
+        earlier = _earlier(source, directory, compare_to or [], timeout)
         names = [r.vehicle.name for r in source.vehicles]
         with planning_display(names, objective or source.planner.objective) as progress:
             planned = pipeline.plan(
@@ -226,9 +236,10 @@ def plan(
         lists = (fence, rally, fence_infinite)
         orders, list_notes = _orders(planned, targets, homes, require_way_home, lists)
         fences = {job.name: job.fence.items for job in orders if job.fence is not None}
+        changes_since = _differences(planned, earlier)
         files = outputs.outputs_of(planned, homes, fences, rally=rally)
         if report:
-            files["report.html"] = outputs.report_of(planned, (), homes, system)
+            files["report.html"] = outputs.report_of(planned, (), homes, system, changes_since)
     except UsageError:
         raise  # a mistake on the command line does not invalidate an earlier mission
     except (InputError, NoMission, CheckFailed):
@@ -238,26 +249,61 @@ def plan(
     _write(directory, files, pictures, later=["upload.json"] if targets else [])
     keep()
     if not as_json:
-        plan_table(planned, homes, system)
-        say_homes(homes, system)
+        _show(planned, homes, changes_since, system)
         _say_written(directory, list(files), list_notes, system)
     results: list[JobResult] = []
     if targets:
-        options = UploadOptions(
-            allow_armed=allow_armed, ignore_position=ignore_position, allow_parameters=allow_parameters, atomic=atomic,
-            timeout_s=timeout,
+        results = _upload(
+            orders, gate, allow_armed=allow_armed, ignore_position=ignore_position, allow_parameters=allow_parameters,
+            atomic=atomic, timeout_s=timeout,
         )  # fmt: skip
-        results = _upload(orders, options, gate)
-        _add_results(directory, planned, results, homes, system if report else None)
+        _add_results(directory, planned, results, homes, system if report else None, changes_since)
         if not as_json:
             upload_table(results, units=system)
             release_table(planned, results, gate)
     left_out = _left_out(planned, mission)
     failure = (uploads.failure(results) if targets else None) or left_out
     if as_json:
-        changed = in_json("changes", source.changes)
-        emit(outputs.summary_of(planned, results, homes) | changed, failure)
+        more = in_json("changes", source.changes) | {"differences": [d.as_dict() for d in changes_since]}
+        emit(outputs.summary_of(planned, results, homes) | more, failure)
     raise typer.Exit(failure["code"] if failure is not None else 0)
+
+
+def _earlier(
+    source: MissionFile, directory: Path, compare_to: list[str], timeout_s: float
+) -> list[dict[str, EarlierMission]]:
+    """The missions of the last plan, and those on board where these are to be compared, each by vehicle."""
+    from gcsplan.export.outdir import outputs_in
+
+    found: list[dict[str, EarlierMission]] = []
+    if outputs_in(directory):
+        from gcsplan.app.plan.earlier import last_plan
+        from gcsplan.cli.output.console import say_notes
+
+        last, notes = last_plan(source, directory)
+        say_notes(notes)
+        found.append(last)
+    if compare_to:
+        from gcsplan.app.plan.earlier import EarlierMission
+        from gcsplan.app.upload import run as uploads
+        from gcsplan.app.upload.job import SIM
+
+        where = uploads.targets(compare_to, [r.vehicle for r in source.vehicles])
+        if SIM in where.values():
+            raise UsageError("--compare-to sim: a simulated vehicle has nothing on board; give a URL, or `link`")
+        with talking(list(where)):
+            missions = uploads.on_board(source, where, timeout_s=timeout_s)
+        found.append({name: EarlierMission(where[name], mission) for name, mission in missions.items()})
+    return found
+
+
+def _differences(planned: Plan, earlier: Sequence[Mapping[str, EarlierMission]]) -> list[PlanDifference]:
+    """What changed for each vehicle, by the missions that it is compared with."""
+    if not any(earlier):
+        return []
+    from gcsplan.app.plan.earlier import differences
+
+    return [difference for missions in earlier for difference in differences(planned, missions).values()]
 
 
 def _orders(
@@ -278,6 +324,17 @@ def _orders(
     where = targets or dict.fromkeys((v.name for v in planned.vehicles), "")
     orders = uploads.jobs_of(planned, where, homes, is_required(planned.source, require_way_home), rally=rally)
     return fencing.with_lists(orders, fencing.ListsSent(fence, rally, infinite)) if orders else ([], ())
+
+
+def _show(planned: Plan, homes: Mapping[str, WayHome], changes_since: Sequence[PlanDifference], units: Units) -> None:
+    """Print the plan, what changed, and the ways home."""
+    from gcsplan.cli.output.console import plan_table
+    from gcsplan.cli.output.difference_table import say_differences
+    from gcsplan.cli.output.verdict_table import say_homes
+
+    plan_table(planned, homes, units)
+    say_differences(changes_since, units)
+    say_homes(homes, units)
 
 
 def _keeping(source: MissionFile, mission: Path, *, save: bool) -> Callable[[], None]:
@@ -301,14 +358,15 @@ def _keeping(source: MissionFile, mission: Path, *, save: bool) -> Callable[[], 
 
 
 def _add_results(
-    directory: Path, planned: Plan, results: list[JobResult], homes: Mapping[str, WayHome], report: Units | None
-) -> None:
+    directory: Path, planned: Plan, results: list[JobResult], homes: Mapping[str, WayHome], report: Units | None,
+    changes_since: Sequence[PlanDifference],
+) -> None:  # fmt: skip
     """Add what an upload came to; ``report``: the units of a report that tells it too, None without one."""
     from gcsplan.app.output import files as outputs
 
     texts = {"upload.json": lambda: outputs.upload_text(planned, results, homes)}
     if report is not None:
-        texts["report.html"] = lambda: outputs.report_of(planned, results, homes, report)
+        texts["report.html"] = lambda: outputs.report_of(planned, results, homes, report, changes_since)
     _add(directory, texts)
 
 
@@ -427,9 +485,10 @@ def _pictures(planned: Plan, png: Path, each: bool) -> dict[Path, bytes]:
     return {png: outputs.picture_of(planned)}
 
 
-def _upload(jobs: list[UploadJob], options: UploadOptions, gate: GateTime | None) -> list[JobResult]:
-    """Upload all jobs with their progress shown."""
+def _upload(jobs: list[UploadJob], gate: GateTime | None, **options: Any) -> list[JobResult]:
+    """Upload all jobs with their progress shown; ``options`` are those of `UploadOptions`."""
     from gcsplan.app.upload import run as uploads
+    from gcsplan.app.upload.job import UploadOptions
     from gcsplan.cli.output.console import transfer_progress
     from gcsplan.sim.vehicle.server import loopback_fleet
 
@@ -437,7 +496,7 @@ def _upload(jobs: list[UploadJob], options: UploadOptions, gate: GateTime | None
         gate.require_ahead(datetime.now(UTC))  # planning took time, so check again
     names = [job.name for job in jobs]
     with talking(names), transfer_progress(names) as moved_on:
-        return uploads.run_jobs(jobs, options, moved_on, simulator=loopback_fleet)
+        return uploads.run_jobs(jobs, UploadOptions(**options), moved_on, simulator=loopback_fleet)
 
 
 def planners(as_json: JsonOption = False) -> None:

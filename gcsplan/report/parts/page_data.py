@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal, Protocol
 
+from gcsplan.check.difference import PlanDifference
 from gcsplan.check.returns.verdict import WayHome
 from gcsplan.check.returns.words import verdict_words
 from gcsplan.check.verdict import Verdict
@@ -133,6 +134,7 @@ class Page:
     units: Units = METRIC
     rehearsed: Rehearsed | None = None
     left_out: tuple[tuple[str, str], ...] = ()
+    differences: tuple[PlanDifference, ...] = ()
 
     @property
     def time_decimals(self) -> int:

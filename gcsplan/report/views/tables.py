@@ -10,6 +10,7 @@ import numpy as np
 from gcsplan.check.verdict import LegFigures, by_item
 from gcsplan.figures import floored
 from gcsplan.mavlink.mission.autopilots import profile_of
+from gcsplan.notes.note import Wording
 from gcsplan.report.parts.html import (
     THIN,
     at_least,
@@ -59,6 +60,19 @@ def vehicles_table(page: Page, verdicts: Sequence[str]) -> str:
     head = ("vehicle|", "verdict|", "path", "gap", "lowest AGL", "highest AGL", "nearest zone|", "steepest", "energy",
             "battery", "arrives", "way home|")  # fmt: skip
     return table("Key figures", head, rows, marks=marks, numbers=range(len(rows)))
+
+
+def differences_html(page: Page) -> str:
+    """What changed since earlier missions, for each vehicle; empty where there is none to compare with."""
+    parts = []
+    for d in page.differences:
+        parts.append(f"<h3>{esc(d.name)}: {esc(d.headline.text(Wording(page.units)))}</h3>")
+        if not d.equal:
+            rows = [tuple(map(esc, row)) for row in d.rows(page.units)]
+            parts.append(table(f"Figures of {esc(d.name)}", ("|", "before", "now", "change"), rows))
+            listed = "".join(f"<li>{esc(note.text(Wording(page.units)))}</li>" for note in d.remarks())
+            parts.append(f"<ul>{listed}</ul>" if listed else "")
+    return f'<section id="difference"><h2>What changed</h2>{"".join(parts)}</section>' if parts else ""
 
 
 def legs_table(subject: Subject, units: Units) -> str:
