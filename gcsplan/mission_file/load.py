@@ -360,6 +360,7 @@ class _MissionReading:
             if vehicle is not None:
                 for within in (within_lean, within_vel_max):
                     vehicle = within(vehicle, keys, at, self.problems, own, local=self.local)
+                vehicle = replace(vehicle, energy=self.units.with_battery_key(vehicle.energy, f"{at}.energy.battery_j"))
             if altitude_frame == "terrain" and keys.autopilot == "px4":
                 self.problems.append(
                     Mistake(f"{at}.autopilot", "px4 flies no terrain frame; use altitude_frame: relative or amsl")

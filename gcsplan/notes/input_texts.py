@@ -15,6 +15,10 @@ INPUT_TEXTS = {
     "zone_letter_is_the_hemisphere": (
         "the S of zone {zone}S is the southern hemisphere: the northing is not in band S"
     ),
+    "defaults_taken": "not given, so by default: {defaults}",
+    "default_of_limit": "{limit:key} {value:g}",
+    "default_of_climb": "{key:max_climb_deg} {climb_deg:g}",
+    "default_of_speed": "speed always {speed_m_s:speed}",
     "limit_assumed": "{limit:key} is not given, {value:g} is taken",
     "plane_climb_assumed": "{key:max_climb_deg} is not given, {climb_deg:g} is taken for a plane",
     "one_speed": "speed_m_s is one number, read as [{slow_m_s:g}, {fast_m_s:g}]: always this speed",

@@ -109,6 +109,10 @@ class Note:
         """The same note without its item and way, for what stands within another note."""
         return Note(self.code, **{name: value for name, value in self.data.items() if name != "way"})
 
+    def without(self, name: str) -> Note:
+        """The same note without a datum that its sentence does not need, such as the ``vehicle`` before it."""
+        return Note(self.code, self.item, **{key: value for key, value in self.data.items() if key != name})
+
     def in_units(self, units: Units) -> str:
         """The sentence with its quantities in ``units``."""
         return self.text(Wording(units))
