@@ -434,6 +434,15 @@ CHECK_TEXTS = {
         "counted|}{part:, as far as it was judged|}"
     ),
     "above_max_agl": ", but above {key:max_agl_m} ({max_agl_m:height}) over home",
+    "return_by_altitude": "return at {height_m:height} above home{above}{rally} ({setting})",
+    "with_rally_points": ", with {count} {count:rally point|rally points} on board (--rally)",
+    "return_by_mission": ("{key:return_route}: mission, back along the track (ArduCopter 4.6 or later, and {setting})"),
+    "land_earlier": "goal at {lat:.6f}, {lon:.6f}, {before_m:reach} earlier{with_change}",
+    "and_that": ", with {change}",
+    "return_proposal": "{change}: {leaves}",
+    "proposal_leaves": "no safe return from {left_m:reach} of it",
+    "proposal_leaves_nothing": "safe return from all of it",
+    "proposals_tried": "tried for the way home, the best first:{proposals:lines}",
     "path_back_makes_safe": (
         "{key:return_route}: mission writes a return path back along the track, which makes every return safe: needs "
         "ArduCopter 4.6 or later, and {setting}"

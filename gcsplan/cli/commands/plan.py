@@ -62,6 +62,7 @@ if TYPE_CHECKING:
     from gcsplan.check.difference import PlanDifference
     from gcsplan.check.returns.verdict import WayHome
     from gcsplan.mission_file import MissionFile
+    from gcsplan.mission_file.changes import MissionChange
     from gcsplan.notes.note import Note
     from gcsplan.units import Units
 
@@ -145,6 +146,14 @@ def plan(
     ] = False,
     way_home: WayHomeOption = False,
     require_way_home: RequireWayHomeOption = False,
+    apply: Annotated[
+        bool,
+        typer.Option(
+            "--apply",
+            help="Take the best change that is tried for the way home: plan with it, and write it into the "
+            "mission file.",
+        ),
+    ] = False,
     rally: Annotated[
         bool,
         typer.Option(
@@ -194,7 +203,6 @@ def plan(
     from gcsplan.app.fleet.start_time import GateTime
     from gcsplan.app.output import files as outputs
     from gcsplan.cli.output.console import release_table, remark, upload_table
-    from gcsplan.cli.output.progress import planning_display
     from gcsplan.export.outdir import settle_outputs
     from gcsplan.mission_file.source import file_of
     from gcsplan.notes.note import in_json
@@ -216,23 +224,26 @@ def plan(
     try:
         depart = None if gate is None else gate.start
         source = pipeline.load_mission(mission, departure=depart, at=at, changes=changes)
-        keep = _keeping(source, mission, save=save)
+        _require_savable(source, save=save)
         targets: dict[str, str] = {}
         if upload:  # otherwise the upload modules need not be imported
             from gcsplan.app.upload import run as uploads
 
             targets = uploads.targets(upload, [r.vehicle for r in source.vehicles])
         earlier = _earlier(source, directory, compare_to or [], timeout)
-        names = [r.vehicle.name for r in source.vehicles]
-        with planning_display(names, objective or source.planner.objective) as progress:
-            planned = pipeline.plan(
-                source, planner=planner, objective=objective, seed=seed,
-                options=_given(encoding=encoding, cost=cost, warm_start=warm_start),
-                progress=progress, gate_utc=depart, jobs=jobs, cluster=cluster, leave_out=leave_out or None,
-            )  # fmt: skip
-        planned, homes = flyable(
-            planned, allow_unjudged=allow_unjudged, home=report or way_home or rally, require_way_home=require_way_home
-        )
+        how = {
+            "planner": planner, "objective": objective, "seed": seed, "gate_utc": depart, "jobs": jobs,
+            "options": _given(encoding=encoding, cost=cost, warm_start=warm_start), "cluster": cluster,
+            "leave_out": leave_out or None,
+        }  # fmt: skip
+        planned = _plan(source, how)
+        if apply and (best := _best_changes(planned)):
+            source = pipeline.load_mission(mission, departure=depart, at=at, changes=[*changes, *best])
+            planned = _plan(source, how)
+        keep = _keeping(source, mission, save=save or (apply and bool(best)))
+        judged = report or way_home or rally or apply
+        planned, homes = flyable(planned, allow_unjudged=allow_unjudged, home=judged, require_way_home=require_way_home)
+        homes = _with_earlier_landing(planned, homes)
         lists = (fence, rally, fence_infinite)
         orders, list_notes = _orders(planned, targets, homes, require_way_home, lists)
         fences = {job.name: job.fence.items for job in orders if job.fence is not None}
@@ -335,6 +346,46 @@ def _show(planned: Plan, homes: Mapping[str, WayHome], changes_since: Sequence[P
     plan_table(planned, homes, units)
     say_differences(changes_since, units)
     say_homes(homes, units)
+
+
+def _plan(source: MissionFile, how: Mapping[str, Any]) -> Plan:
+    """The plan of a mission, with its progress shown; ``how`` are options of `gcsplan.plan`."""
+    from gcsplan.app.fleet import pipeline
+    from gcsplan.cli.output.progress import planning_display
+
+    names = [r.vehicle.name for r in source.vehicles]
+    with planning_display(names, how["objective"] or source.planner.objective) as progress:
+        return pipeline.plan(source, progress=progress, **how)
+
+
+def _best_changes(planned: Plan) -> list[MissionChange]:
+    """The best change for the way home of each vehicle that has one; a vehicle that lacks both is named."""
+    from gcsplan.app.fleet.earlier_landing import best_changes, with_earlier_landing
+    from gcsplan.app.plan.way_home import homes_of
+    from gcsplan.cli.output.console import remark
+
+    homes = with_earlier_landing(planned, homes_of(planned))
+    for name, home in homes.items():
+        if home.safe is not True and not home.proposals:
+            remark(f"note: --apply: nothing that was tried makes more of the way home of {name} safe")
+    return best_changes(homes)
+
+
+def _with_earlier_landing(planned: Plan, homes: dict[str, WayHome]) -> dict[str, WayHome]:
+    """The ways home, with an earlier landing among the proposals where all others leave something unsafe."""
+    if all(home.safe is not False for home in homes.values()):
+        return homes
+    from gcsplan.app.fleet.earlier_landing import with_earlier_landing
+
+    return with_earlier_landing(planned, homes)
+
+
+def _require_savable(source: MissionFile, *, save: bool) -> None:
+    """Refuse now what cannot be saved once the plan is written. Raises UsageError."""
+    from gcsplan.mission_file.changes import saving
+
+    if save and source.content is not None:
+        saving(source.content)
 
 
 def _keeping(source: MissionFile, mission: Path, *, save: bool) -> Callable[[], None]:

@@ -10,6 +10,7 @@ import pytest
 
 from gcsplan.sim.vehicle.server import SimServer
 from gcsplan.vehicle import Autopilot
+from tests.support.batches import mission
 from tests.support.crossing import CROSSING, OUTPUTS, vehicle
 
 
@@ -103,3 +104,21 @@ def test_a_plan_says_what_changed_since_the_last_one_and_since_the_mission_on_bo
 def test_a_wrong_mission_to_compare_with_is_refused_before_planning(run: Any, tmp_path: Path, where: str) -> None:
     assert run("plan", CROSSING, "--compare-to", where)[0] == 2
     assert not (tmp_path / "crossing").exists()
+
+
+def test_the_best_way_home_is_applied_and_saved(run: Any, tmp_path: Path) -> None:
+    file = tmp_path / "field.yaml"
+    zone = {"name": "tower", "center": [47.0, 8.01], "radius_m": 60, "ceiling_agl_m": 45}
+    file.write_text("# mine\n" + mission(no_fly=[zone]))
+    assert "no safe return" in run("plan", file, "--way-home")[1]
+    code, out, err = run("plan", file, "--apply")
+    assert code == 0
+    assert "safe return from all of it" in out
+    assert "--apply: vehicles[0].rtl_rel_home_m is" in err
+    text = file.read_text()
+    assert text.startswith("# mine\n")
+    assert "rtl_rel_home_m" in text
+    assert run("plan", file, "--require-way-home")[0] == 0
+    before = file.read_bytes()
+    assert run("plan", file, "--apply")[0] == 0  # nothing is left to be improved
+    assert file.read_bytes() == before
