@@ -24,6 +24,7 @@ from gcsplan.report.parts.html import esc
 from gcsplan.report.parts.track_samples import MOST_SAMPLES
 from gcsplan.units import METRIC, Units
 from gcsplan.vehicle import Vehicle
+from gcsplan.world.geodesy.daylight import Daylight
 from gcsplan.world.world import World
 
 
@@ -121,6 +122,7 @@ class Page:
     """Everything that one report shows. ``facts`` are names and values of what was requested, in the order shown.
 
     ``left_out`` are names of vehicles without a mission, and why. ``units`` are those of all numbers on the page.
+    ``daylight`` is that of the first start, None if it is not known when the mission is flown.
     """
 
     title: str
@@ -135,6 +137,7 @@ class Page:
     rehearsed: Rehearsed | None = None
     left_out: tuple[tuple[str, str], ...] = ()
     differences: tuple[PlanDifference, ...] = ()
+    daylight: Daylight | None = None
 
     @property
     def time_decimals(self) -> int:
