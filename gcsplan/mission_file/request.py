@@ -68,6 +68,7 @@ class VehicleRequest:
     rtl_rel_home_m: float | None = None
     return_route: ReturnRoute | None = None
     takeoff_heading_deg: float | None = None
+    climb_out: Literal["straight", "circles"] = "straight"
     start_amsl_m: float | None = None
     goal_amsl_m: float | None = None
 

@@ -10,7 +10,8 @@ from collections.abc import Iterable
 from gcsplan.notes.note import Note
 
 FLIGHT = (
-    "climb_out", "climb_out_in_circles", "climb_out_straight", "climb_out_circles", "climb_out_drifts", "turns_early",
+    "climb_out", "climb_out_in_circles", "circles_instead", "climb_out_straight", "climb_out_circles",
+    "climb_out_drifts", "turns_early",
     "approach", "glide_straight", "lands_downhill", "lands_fast", "waits_on_ground", "holds_at_gate", "holds_and_waits",
     "leaves_later", "leaves_earlier", "flies_at", "keeps_clear", "lean_bounds_speed", "lean_bounds_speed_curably",
     "velocity_bounds_speed", "lean_to_set", "lean_counted_with", "takeoff_raised", "approach_raised", "via_moved",
