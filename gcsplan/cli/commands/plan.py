@@ -224,7 +224,7 @@ def plan(
     try:
         depart = None if gate is None else gate.start
         source = pipeline.load_mission(mission, departure=depart, at=at, changes=changes)
-        _require_savable(source, save=save)
+        _begin_changes(source, save=save)
         targets: dict[str, str] = {}
         if upload:  # otherwise the upload modules need not be imported
             from gcsplan.app.upload import run as uploads
@@ -241,8 +241,8 @@ def plan(
             source = pipeline.load_mission(mission, departure=depart, at=at, changes=[*changes, *best])
             planned = _plan(source, how)
         keep = _keeping(source, mission, save=save or (apply and bool(best)))
-        judged = report or way_home or rally or apply
-        planned, homes = flyable(planned, allow_unjudged=allow_unjudged, home=judged, require_way_home=require_way_home)
+        home = report or way_home or rally or apply
+        planned, homes = flyable(planned, allow_unjudged=allow_unjudged, home=home, require_way_home=require_way_home)
         homes = _with_earlier_landing(planned, homes)
         lists = (fence, rally, fence_infinite)
         orders, list_notes = _orders(planned, targets, homes, require_way_home, lists)
@@ -380,20 +380,22 @@ def _with_earlier_landing(planned: Plan, homes: dict[str, WayHome]) -> dict[str,
     return with_earlier_landing(planned, homes)
 
 
-def _require_savable(source: MissionFile, *, save: bool) -> None:
-    """Refuse now what cannot be saved once the plan is written. Raises UsageError."""
+def _begin_changes(source: MissionFile, *, save: bool) -> None:
+    """Say the changes of a mission, and refuse now what cannot be saved once the plan is written. Raises UsageError."""
+    from gcsplan.cli.output.console import say_notes
     from gcsplan.mission_file.changes import saving
 
+    say_notes(source.changes)
     if save and source.content is not None:
         saving(source.content)
 
 
 def _keeping(source: MissionFile, mission: Path, *, save: bool) -> Callable[[], None]:
-    """Say the changes of a mission; returns what saves them, if they are to be saved, once the plan is written."""
+    """The function that saves a mission's changes once the plan is written, if they are to be saved."""
     from gcsplan.cli.output.console import remark, say_notes
     from gcsplan.mission_file.changes import saving
 
-    say_notes(source.changes)
+    say_notes(note for note in source.changes if note.data["option"] == "--apply")
     if save:
         assert source.content is not None
         write = saving(source.content)

@@ -16,13 +16,14 @@ if TYPE_CHECKING:
 
 MOST_WITH_FIGURES = 4
 """Most vehicles whose figures are in a table; of more only the headlines."""
+MOST_HEADLINES = 30
 
 
 def say_differences(differences: Sequence[PlanDifference], units: Units) -> None:
     """Print what changed for each vehicle: a headline, and of a few vehicles that changed figures, legs and notes."""
     wording = Wording(units)
     changed = [d for d in differences if not d.equal]
-    for d in differences:
+    for d in differences[:MOST_HEADLINES]:
         headline = f"{d.name}: {d.headline.text(wording)}"
         if d.equal or len(changed) > MOST_WITH_FIGURES:
             say(headline)
@@ -32,3 +33,5 @@ def say_differences(differences: Sequence[PlanDifference], units: Units) -> None
             table.add_row(*row)
         print_table(table)
         say_notes(d.remarks(), wording)
+    if len(differences) > MOST_HEADLINES:
+        say(f"… and {len(differences) - MOST_HEADLINES} more: --json has all")

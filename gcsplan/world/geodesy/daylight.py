@@ -8,7 +8,7 @@ from datetime import UTC, datetime, timedelta
 
 ZENITH_DEG = 90.833
 """The sun's middle when its upper edge appears: it is below the horizon, by refraction and its radius."""
-ROUNDS = 3
+SUN_ROUNDS = 3
 """The sun moves between noon and its rise, so each time is found from the sun's place at the time before."""
 _J2000 = datetime(2000, 1, 1, 12, tzinfo=UTC)
 
@@ -29,7 +29,7 @@ class Daylight:
 def daylight(lat_deg: float, lon_deg: float, at: datetime) -> Daylight:
     """The daylight of the solar day that holds ``at``, a time with a zone."""
     noon = at
-    for _ in range(ROUNDS):  # the noon nearest to ``at``: at most half a day away
+    for _ in range(SUN_ROUNDS):  # the noon nearest to ``at``: at most half a day away
         minutes = 720.0 - 4.0 * lon_deg - sun(noon)[1]
         midnight = noon.astimezone(UTC).replace(hour=0, minute=0, second=0, microsecond=0)
         noon = midnight + timedelta(minutes=minutes)
@@ -37,7 +37,7 @@ def daylight(lat_deg: float, lon_deg: float, at: datetime) -> Daylight:
     times: list[datetime] = []
     for side in (-1.0, 1.0):
         when = noon
-        for _ in range(ROUNDS):
+        for _ in range(SUN_ROUNDS):
             declination_deg, equation_min = sun(when)
             angle_deg = hour_angle_deg(lat_deg, declination_deg)
             if angle_deg is None:
