@@ -92,7 +92,7 @@ def text_of(draft: Draft, file: str, name: str) -> str:
     ]
     parts += _section("terrain", _terrain(draft))
     parts += _section("limits", _limits(draft))
-    given = "\n".join(["no_fly:", *(f"  - {{file: {_word(zone)}}}" for zone in draft.zones)])
+    given = "\n".join(["no_fly:", *(f"  - {{file: {word(zone)}}}" for zone in draft.zones)])
     parts.append(_ZONES.format(description=describe(MissionKeys, "no_fly"), given=given if draft.zones else "#no_fly:"))
     parts += _section("vehicles", _vehicle(draft), dash=True)
     for number, (start, goal) in enumerate(draft.others, start=1):
