@@ -94,7 +94,7 @@ class Energy:
     airspeed of the flights that the numbers are fitted to, None if that is not known. ``stated``: the numbers were
     given; else they are the paper's, which say nothing about this aircraft, and no output tells an energy. ``papers``:
     a battery or a hover was given and nothing of what flying takes, so the paper's numbers count, marked in every
-    output.
+    output. ``battery_key`` is the key of the mission file that gave ``battery_j``, in units of ``battery_unit_j``.
     """
 
     vertical_j_per_m: float = 120.0
@@ -107,6 +107,8 @@ class Energy:
     fitted_m_s: tuple[float, float] | None = None
     stated: bool = True
     papers: bool = False
+    battery_key: str = field(default="battery_j", compare=False, repr=False)
+    battery_unit_j: float = field(default=1.0, compare=False, repr=False)
 
     def under_way_j(self, vertical_m: Amount, air_m: Amount, seconds: Amount) -> Amount:
         """Joules of moving for ``seconds``: ``vertical_m`` up and down, ``air_m`` horizontally through the air.

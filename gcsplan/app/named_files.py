@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Collection
 from pathlib import Path
 
@@ -17,8 +18,16 @@ def names_several(text: str) -> bool:
     return os.path.isdir(text) or (any(c in text for c in "*?[") and not os.path.exists(text))
 
 
+def natural(path: Path) -> list[tuple[str | int, ...]]:
+    """The key of the order in which people count: ``leg2`` before ``leg10``, folder by folder."""
+    return [
+        tuple(int(part) if k % 2 else part for k, part in enumerate(re.split("([0-9]+)", name))) for name in path.parts
+    ]
+
+
 def named_files(text: str, suffixes: Collection[str]) -> list[Path]:
-    """The files of a folder, and of those in it, that end in ``suffixes``, or of a pattern, sorted; else ``text``.
+    """The files of a folder, and of those in it, that end in ``suffixes``, or of a pattern, in natural order; else
+    ``text``.
 
     Raises InputError for a pattern that is none, or a folder that cannot be read.
     """
@@ -30,7 +39,7 @@ def named_files(text: str, suffixes: Collection[str]) -> list[Path]:
         if "\0" in text:  # from Python 3.13 on, such a pattern finds nothing
             raise ValueError("embedded null character")
         if path.is_dir():
-            return sorted(p for p in path.rglob("*") if p.suffix in suffixes and p.is_file())
-        return sorted(p for p in root.glob(str(path.relative_to(path.anchor))) if p.is_file())
+            return sorted((p for p in path.rglob("*") if p.suffix in suffixes and p.is_file()), key=natural)
+        return sorted((p for p in root.glob(str(path.relative_to(path.anchor))) if p.is_file()), key=natural)
     except (OSError, ValueError) as why:
         raise InputError(f"cannot be searched for files: {why}", where=text) from why

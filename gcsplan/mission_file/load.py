@@ -15,6 +15,7 @@ from typing import Any, get_args
 
 from gcsplan.errors import InputError, Mistake
 from gcsplan.mavlink.mission.mission import AltitudeFrame
+from gcsplan.mission_file.changes import MissionChange, changed
 from gcsplan.mission_file.published.times import Hours, hours_of, texts_of
 from gcsplan.mission_file.published.unused import (
     faults_near,
@@ -113,6 +114,7 @@ def load_mission(
     departure: datetime | None = None,
     at: str | Sequence[str] | None = None,
     terrain: Mapping[str, object] | None = None,
+    changes: Sequence[MissionChange] = (),
 ) -> MissionFile:
     """Read and judge a mission; nothing is planned yet.
 
@@ -125,7 +127,8 @@ def load_mission(
     ``planner_names`` replaces the table of planners. ``around`` are places (latitude, longitude) in degrees, besides
     the mission's own, for which terrain is loaded too if it covers them. ``departure`` is when the mission begins, if
     it does not say so itself (``at``). The argument ``at`` counts in place of that key. ``terrain``: keys of its
-    section that count before the mission's own.
+    section that count before the mission's own. They, and then the ``changes``, are set in the document before it is
+    read; ``content.changes`` has a note on each of the latter.
 
     Returns a `MissionFile`: vehicles, zones and terrain in metres. Raises InputError with every problem that was found,
     each with its place (file and key, such as ``vehicles[1].speed_m_s``; a mission without a file is called
@@ -142,12 +145,16 @@ def load_mission(
         >>> [request.vehicle.name for request in mission.vehicles]
         ['uav1']
     """
-    file, where, raw, written = read_content(source, text, terrain)
+    file, where, raw, written = read_content(source, text)
     if "version" in raw and (raw["version"] != 1 or isinstance(raw["version"], bool | float)):
         words = f"this gcsplan reads version 1, given {shown(raw['version'])}; write `version: 1`, or update gcsplan"
         raise InputError(words, where=f"{where}: version")
     names = None if planner_names is None else tuple(planner_names)
-    return load_content(Content(file, where, raw, written, names, tuple(around), departure, texts_of(at)))
+    keys = [MissionChange("", "terrain", key, value) for key, value in (terrain or {}).items()]
+    made = changed(raw, [*keys, *changes], file.parent)
+    return load_content(
+        Content(file, where, made.raw, written, names, tuple(around), departure, texts_of(at), made.options, made.notes)
+    )
 
 
 def load_content(content: Content) -> MissionFile:
@@ -254,8 +261,16 @@ class _MissionReading:
     def _refusal(self, problems: list[Mistake]) -> InputError:
         """All problems as the user wrote the keys, with their lines if the mission was a text."""
         listed = listed_once(few(problems, self.where.removesuffix(": "), 10 * MOST_OF_A_SECTION))
-        listed = [self.units.as_written(p) for p in listed]
+        listed = [self._by_option(self.units.as_written(p)) for p in listed]
         return InputError.of(listed if self.text is None else with_lines(listed, self.text, self.where))
+
+    def _by_option(self, problem: Mistake) -> Mistake:
+        """The problem at the option that set its key, if one did."""
+        for key, option in self.content.options:
+            rest = problem.where.removeprefix(self.where + key)
+            if rest != problem.where and rest[:1] in ("", "[", "."):
+                return replace(problem, where=f"{option}: {key}{rest}")
+        return problem
 
     # -- the plain keys ------------------------------------------------------------------------------------------
 
@@ -345,6 +360,7 @@ class _MissionReading:
             if vehicle is not None:
                 for within in (within_lean, within_vel_max):
                     vehicle = within(vehicle, keys, at, self.problems, own, local=self.local)
+                vehicle = replace(vehicle, energy=self.units.with_battery_key(vehicle.energy, f"{at}.energy.battery_j"))
             if altitude_frame == "terrain" and keys.autopilot == "px4":
                 self.problems.append(
                     Mistake(f"{at}.autopilot", "px4 flies no terrain frame; use altitude_frame: relative or amsl")

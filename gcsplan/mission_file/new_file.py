@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Literal, get_args, get_origin
 
 from gcsplan.mission_file.json_schema import LATE_DEFAULTS, MODELINE, describe
+from gcsplan.mission_file.values.document import word
 from gcsplan.mission_file.values.keys import Keys
 from gcsplan.mission_file.values.places import read_place
 from gcsplan.mission_file.values.schema import (
@@ -30,7 +31,6 @@ NEW_MIN_AGL_M = 60.0
 WING_RADIUS_M = 100.0
 
 _DECIMAL_PAIR = re.compile(r"\s*([-+]?\d+(?:\.\d+)?)\s*,\s*([-+]?\d+(?:\.\d+)?)\s*")
-_RESERVED_WORDS = {"yes", "no", "on", "off", "true", "false", "null"}
 _FILE_HEAD = """{modeline}
 # A mission of gcsplan. Plan it:  gcsplan plan {file}
 # Keys carry their unit in the name. A line such as `#max_agl_m: 120` is a choice that is not made: remove its #.
@@ -92,7 +92,7 @@ def text_of(draft: Draft, file: str, name: str) -> str:
     ]
     parts += _section("terrain", _terrain(draft))
     parts += _section("limits", _limits(draft))
-    given = "\n".join(["no_fly:", *(f"  - {{file: {_word(zone)}}}" for zone in draft.zones)])
+    given = "\n".join(["no_fly:", *(f"  - {{file: {word(zone)}}}" for zone in draft.zones)])
     parts.append(_ZONES.format(description=describe(MissionKeys, "no_fly"), given=given if draft.zones else "#no_fly:"))
     parts += _section("vehicles", _vehicle(draft), dash=True)
     for number, (start, goal) in enumerate(draft.others, start=1):
@@ -111,11 +111,11 @@ KeyRow = tuple[type[Keys], str, str, bool]
 
 
 def _terrain(draft: Draft) -> Iterator[KeyRow]:
-    dem = ", ".join(_word(d) for d in draft.dem)
+    dem = ", ".join(word(d) for d in draft.dem)
     if draft.dem:
         yield TerrainKeys, "dem", dem if len(draft.dem) == 1 else f"[{dem}]", True
         datum = draft.vertical_datum
-        yield TerrainKeys, "vertical_datum", "EGM96" if datum is None else _word(datum), datum is not None
+        yield TerrainKeys, "vertical_datum", "EGM96" if datum is None else word(datum), datum is not None
         for key, value in (("height_unit", draft.height_unit), ("nodata", draft.nodata)):
             if value is not None:
                 yield TerrainKeys, key, value, True
@@ -166,7 +166,7 @@ def _vehicle(draft: Draft) -> Iterator[KeyRow]:
         yield VehicleKeys, "turn_radius_m", f"{WING_RADIUS_M:g}", True
         yield VehicleKeys, "climb_out_m_s", "5", False
         yield VehicleKeys, "climb_out_speed_m_s", "19", False
-    yield VehicleKeys, "link", _word(draft.link or "udpout:127.0.0.1:14560"), draft.link is not None
+    yield VehicleKeys, "link", word(draft.link or "udpout:127.0.0.1:14560"), draft.link is not None
     battery = {key: EnergyKeys.model_fields[key].default for key in ("vertical_j_per_m", "horizontal_j_per_m")}
     values = ", ".join(f"{key}: {value:g}" for key, value in battery.items())
     wh = draft.battery_wh
@@ -220,9 +220,3 @@ def _key(kind: type[Keys], key: str, value: str, indent: str, *, made: bool = Tr
         break_on_hyphens=False,
     )
     yield f"{indent}{'' if made else '#'}{key}: {value}"
-
-
-def _word(text: str) -> str:
-    """A text as a YAML value, in quotes unless it cannot be taken for anything else."""
-    plain = re.fullmatch(r"[A-Za-z/][A-Za-z0-9_./:-]*[A-Za-z0-9_]", text) and text.lower() not in _RESERVED_WORDS
-    return text if plain else json.dumps(text, ensure_ascii=False)

@@ -68,6 +68,7 @@ class VehicleRequest:
     rtl_rel_home_m: float | None = None
     return_route: ReturnRoute | None = None
     takeoff_heading_deg: float | None = None
+    climb_out: Literal["straight", "circles"] = "straight"
     start_amsl_m: float | None = None
     goal_amsl_m: float | None = None
 
@@ -89,8 +90,9 @@ class PlannerRequest:
 class Content:
     """The source of a mission, from which any process can read it again.
 
-    ``where`` is its name in messages, ``given`` the mapping of keys, ``text`` its text if it has one. The others are as
-    in `load_mission`.
+    ``where`` is its name in messages, ``given`` the mapping of keys after all ``changes``, ``text`` the text before
+    them if it has one. ``options``: keys that a change has set, each with the option. The others are as in
+    `load_mission`.
     """
 
     file: Path
@@ -101,6 +103,8 @@ class Content:
     around: tuple[tuple[float, float], ...] = ()
     departure: datetime | None = None
     at: tuple[str, ...] | None = None
+    options: tuple[tuple[str, str], ...] = ()
+    changes: tuple[Note, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,3 +145,8 @@ class MissionFile:
     hours: Hours | None = None
     at_level: Callable[[int], MissionFile | None] | None = None
     content: Content | None = None
+
+    @property
+    def changes(self) -> tuple[Note, ...]:
+        """A note on each change of the document that was made before it was read."""
+        return () if self.content is None else self.content.changes

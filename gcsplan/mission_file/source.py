@@ -67,11 +67,9 @@ UNNAMED = Path("mission.yaml")
 def read_content(
     source: str | os.PathLike[str] | Mapping[str, Any] | None,
     text: str | None,
-    terrain: Mapping[str, object] | None = None,
 ) -> tuple[Path, str, dict[str, Any], str | None]:
     """The file, its name in messages, the mapping of keys, and its text if it has one.
 
-    ``terrain``: keys that count before those of its ``terrain:``.
     Raises InputError and TypeError as `load_mission`.
     """
     if isinstance(source, str) and ("\n" in source or "\r" in source):
@@ -99,8 +97,6 @@ def read_content(
         tight = missing_space(raw) if isinstance(raw, str) else ""
         words = f"a mission file is a mapping of keys (version, terrain, …), given {shown(raw)}"
         raise InputError(f"{words}; {tight}" if tight else words, where=where)
-    if terrain and isinstance(raw.get("terrain"), dict):
-        raw = {**raw, "terrain": {**raw["terrain"], **terrain}}
     return file, where, raw, text
 
 

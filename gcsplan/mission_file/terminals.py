@@ -81,6 +81,7 @@ def make_request(
         rtl_rel_home_m=keys.rtl_rel_home_m,
         return_route=keys.return_route,
         takeoff_heading_deg=keys.takeoff_heading_deg,
+        climb_out=keys.climb_out,
         start_amsl_m=start.amsl_m,
         goal_amsl_m=goal.amsl_m,
     )

@@ -4,6 +4,18 @@ On the way home: from where a return is not safe and why, what to set, and which
 """
 
 CHECK_TEXTS = {
+    # -- the difference to an earlier mission of the same vehicle --
+    "difference_none": "nothing changed since {since}: the missions are equal, item for item",
+    "difference_of_items": "no leg moved since {since}; items differ",
+    "difference_of_path": "{moved} of {legs} {legs:leg|legs} moved since {since}, by {most_m:distance.0 up} at most",
+    "difference_not_measured": "how far the legs moved since {since} is not measured",
+    "moved_leg": "{by_m:distance.0 up}",
+    "more_moved_legs": "{count} more",
+    "difference_moved_legs": "moved farthest: {legs}",
+    "difference_new_note": "new: {note}",
+    "difference_gone_note": "no longer: {note}",
+    "difference_earlier_breaks": "{since} would break a limit now, or is not judged: {note}",
+    "last_plan_unread": "the last plan cannot be compared: {why}",
     # -- what an autopilot does with a mission's items, and on what of it is not judged --
     # -- home --------------------------------------------------------------------------------------------------------
     "home_ground_unknown": (
@@ -305,6 +317,7 @@ CHECK_TEXTS = {
         "battery: the flight needs {needs_j:joules} and {usable_j:joules} may be used ({battery_j:joules} less "
         "{reserve_percent:g} % reserve)"
     ),
+    "battery_that_would_do": "{key_name}: {enough} would do for this path",
     "too_many_items": "the mission has {count} items and {autopilot} takes {most}",
     "refused_on_upload": "would be refused on upload: {why}",
     "item_unreached": "item {by} {jumps:jumps back|holds} without end: item {item} is never reached",
@@ -421,6 +434,15 @@ CHECK_TEXTS = {
         "counted|}{part:, as far as it was judged|}"
     ),
     "above_max_agl": ", but above {key:max_agl_m} ({max_agl_m:height}) over home",
+    "return_by_altitude": "return at {height_m:height} above home{above}{rally} ({setting})",
+    "with_rally_points": ", with {count} {count:rally point|rally points} on board (--rally)",
+    "return_by_mission": ("{key:return_route}: mission, back along the track (ArduCopter 4.6 or later, and {setting})"),
+    "land_earlier": "goal at {lat:.6f}, {lon:.6f}, {before_m:reach} earlier{with_change}",
+    "and_that": ", with {change}",
+    "return_proposal": "{change}: {leaves}",
+    "proposal_leaves": "no safe return from {left_m:reach} of it",
+    "proposal_leaves_nothing": "safe return from all of it",
+    "proposals_tried": "tried for the way home, the best first:{proposals:lines}",
     "path_back_makes_safe": (
         "{key:return_route}: mission writes a return path back along the track, which makes every return safe: needs "
         "ArduCopter 4.6 or later, and {setting}"

@@ -2,6 +2,10 @@
 
 INPUT_TEXTS = {
     # -- how the keys of a mission file, and the options that stand for them, were read --
+    "change_of_key": "{option}: {key_path} is {now} in place of {was}",
+    "change_adds_key": "{option}: {key_path} is {now}, where nothing is given",
+    "change_adds_zone": "{option}: no_fly has {now}, too",
+    "change_of_zones": "{option}: {now} in place of {count} {count:entry|entries} of no_fly",
     "value_converted": "{given} {symbol}, read as {own_key}: {value}",
     "charge_converted": "{given} {symbol} at {volts:g} V, read as {own_key}: {value}",
     "key_read_as_another": "read as {own_key}",
@@ -11,6 +15,10 @@ INPUT_TEXTS = {
     "zone_letter_is_the_hemisphere": (
         "the S of zone {zone}S is the southern hemisphere: the northing is not in band S"
     ),
+    "defaults_taken": "not given, so by default: {defaults}",
+    "default_of_limit": "{limit:key} {value:g}",
+    "default_of_climb": "{key:max_climb_deg} {climb_deg:g}",
+    "default_of_speed": "speed always {speed_m_s:speed}",
     "limit_assumed": "{limit:key} is not given, {value:g} is taken",
     "plane_climb_assumed": "{key:max_climb_deg} is not given, {climb_deg:g} is taken for a plane",
     "one_speed": "speed_m_s is one number, read as [{slow_m_s:g}, {fast_m_s:g}]: always this speed",

@@ -109,6 +109,10 @@ class Note:
         """The same note without its item and way, for what stands within another note."""
         return Note(self.code, **{name: value for name, value in self.data.items() if name != "way"})
 
+    def without(self, name: str) -> Note:
+        """The same note without a datum that its sentence does not need, such as the ``vehicle`` before it."""
+        return Note(self.code, self.item, **{key: value for key, value in self.data.items() if key != name})
+
     def in_units(self, units: Units) -> str:
         """The sentence with its quantities in ``units``."""
         return self.text(Wording(units))
@@ -135,6 +139,20 @@ class Note:
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _revived, (self.code, self.item, dict(self.data))
+
+
+def note_of(given: Any) -> Note | None:
+    """The note that `Note.as_dict` gave, also of JSON; None for another value, or a code of another version."""
+    try:
+        return Note(given["code"], given["item"], **{name: _datum(v) for name, v in given["data"].items()})
+    except (KeyError, TypeError, AttributeError):
+        return None
+
+
+def _datum(value: Any) -> Datum:
+    if isinstance(value, list):
+        return tuple(map(_datum, value))
+    return note_of(value) if isinstance(value, dict) else value
 
 
 def in_json(key: str, notes: Iterable[Note], wording: Wording = IN_FILES) -> dict[str, Any]:

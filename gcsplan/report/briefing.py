@@ -1,7 +1,8 @@
-"""The briefing: one printed page with what a crew reads and signs; on the screen it is not shown.
+"""The briefing: two printed pages with what a crew reads and signs; on the screen they are not shown.
 
-It holds nothing that the rest of the report does not hold. Names and messages are cut to a length, and lists to a
-number, so that it stays one page; the page says how much it leaves out.
+The first has verdict, map, limits, times and lines to sign on, the second parameters and way points. They hold nothing
+that the rest of the report does not hold, but for the daylight. Names and messages are cut to a length, and lists to a
+number, so that each stays one page; the page says how much it leaves out.
 """
 
 from __future__ import annotations
@@ -10,7 +11,9 @@ import math
 from collections.abc import Iterator, Sequence
 
 from gcsplan import __version__
+from gcsplan.check.verdict import by_item
 from gcsplan.figures import counted
+from gcsplan.mavlink.mission.parameter_list import Setting
 from gcsplan.mavlink.mission.return_parameters import setting
 from gcsplan.report.parts.html import (
     Mark,
@@ -44,6 +47,9 @@ MAIN_PARAMETERS = ("speed", "return_speed", "lean", "roll")
 """The parameters that stand on the briefing, by their newest names; the report's tables have all."""
 MARK_KINDS = ("start", "goal", "rally", "name")
 """The marks of the map that are on the briefing's, too."""
+MOST_PARAMETERS, MOST_WAY_POINTS = 30, 24
+"""Most parameters, and most way points of all vehicles together, on the second page."""
+STILL_AIR = "still air: times, energies and paths count no wind"
 NOT_IN_IT = "Wind, emergency landing sites and moving obstacles are not in the model."
 
 
@@ -65,7 +71,62 @@ def briefing_html(page: Page, verdict: tuple[str, str, str, str], relief: Relief
         f"{problems}{_map(page, relief, marks, high_mm)}{_vehicles(page, shown)}"
         + "".join(f'<p class="fact">{text}</p>' for text in (more, _rally(page, shown), apart, _order(page)) if text)
         + f'<p class="fact"><b>{bare}</b>{NOT_IN_IT} {_inputs(page)}</p>{_signatures()}</section>'
+        + f'<section class="briefing" id="briefing-2"><p class="brand">mission briefing, second page</p>'
+        f'<p class="fact">Wind: {STILL_AIR}. {_daylight(page)}</p>'
+        f"{_parameters(shown)}{_way_points(page, shown)}</section>"
     )
+
+
+def _daylight(page: Page) -> str:
+    """Sunrise and sunset at the start, if it is known when the mission is flown."""
+    light = page.daylight
+    if light is None:
+        return "Daylight is not known: the mission does not say when it is flown (<code>at</code>)."
+    day = f"{light.noon:%Y-%m-%d}"
+    if light.sunrise is None or light.sunset is None:
+        return f"Daylight at the start on {day}: the sun {'does not set' if light.up else 'does not rise'}."
+    return f"Daylight at the start on {day}: sunrise {light.sunrise:%H:%M}, sunset {light.sunset:%H:%M} UTC."
+
+
+def _parameters(shown: Sequence[tuple[int, Subject]]) -> str:
+    """The parameters to set, failsafes among them, a column for each vehicle."""
+    values = [{s.parameter.names[-1].name: _set_to(s) for s in subject.settings} for _, subject in shown]
+    names = list(dict.fromkeys(name for column in values for name in column))
+    if not names:
+        return ""
+    rows = [(esc(name), *(esc(column.get(name, "–").strip()) for column in values)) for name in names[:MOST_PARAMETERS]]
+    rest = len(names) - len(rows)
+    head = ["|", *(f"{esc(_name(s.name))}|" for _, s in shown)]
+    title = "Parameters and failsafes on board that this was judged with: set them, or compare"
+    return table(title, head, rows) + (f'<p class="fact">and {rest} more, in the tables.</p>' if rest else "")
+
+
+def _set_to(setting: Setting) -> str:
+    """The value of a parameter by its newest name, and the rule if others are within it."""
+    rule = setting.rule_words()
+    return f"{setting.parameter.names[-1].value(setting.value):.6g}" + (f" ({rule})" if rule else "")
+
+
+def _way_points(page: Page, shown: Sequence[tuple[int, Subject]]) -> str:
+    """The way points of each vehicle with their heights and times; of many the first."""
+    units, parts = page.units, []
+    for _, s in shown:
+        clock, flown, rows = s.verdict.clock_s(s.slot), 0, []
+        for item, stretches in by_item(s.verdict.legs):
+            flown += stretches
+            rows.append(
+                (
+                    f"{item.seq} {esc(item.kind)}", place(*item.end[:2]), num(item.end[2], 0, units.amsl),
+                    least(item.agl_end_m, 0, units.height), num(item.length_m, 0, units.leg),
+                    duration(s.depart_s + clock[flown - 1]),
+                )
+            )  # fmt: skip
+        most = MOST_WAY_POINTS // len(shown)
+        rest = len(rows) - most
+        head = ("to item|", "place|", "altitude", "above ground", "leg", "at")
+        parts.append(table(f"Way points of {esc(_name(s.name))}", head, rows[:most]))
+        parts.append(f'<p class="fact">and {rest} more, in the tables.</p>' if rest > 0 else "")
+    return "".join(parts)
 
 
 def _shown(page: Page) -> list[tuple[int, Subject]]:

@@ -15,6 +15,7 @@ import numpy as np
 from gcsplan import __version__
 from gcsplan.figures import steepened
 from gcsplan.notes.note import Wording
+from gcsplan.notes.order import for_people
 from gcsplan.report.briefing import briefing_html
 from gcsplan.report.parts.html import (
     data_block,
@@ -105,7 +106,7 @@ def render_page(page: Page) -> str:
             briefing_html(page, _verdict(page), relief, marks), _header(page), _vehicles(page),
             f'<section><h2>Map</h2>{tools("map")}{map_html(page, lines, relief, marks, flown)}'
             f"{replay_html(replay, page) if replay else ''}</section>",
-            rehearsal_html(page), _scene(page, relief),
+            tables.differences_html(page), rehearsal_html(page), _scene(page, relief),
             *_profiles(page, lines, found, full), home, fleet, *_details(page, lines, found, full), _end(page),
         )
     )  # fmt: skip
@@ -306,8 +307,8 @@ def _unjudged(page: Page) -> list[tuple[Subject, str]]:
 
 def _end(page: Page) -> str:
     wording = next((s.wording(page.units) for s in page.subjects), Wording(page.units))  # a page has one reader
-    notes = [(note.text(wording), "") for note in page.notes]
-    notes += [(note.text(wording), s.name) for s in page.subjects for note in s.notes]
+    noted = [("", note) for note in page.notes] + [(s.name, note) for s in page.subjects for note in s.notes]
+    notes = [(note.text(wording), name) for name, note in for_people(noted)]
     several = len(page.subjects) > 1
     listed = "".join(
         f"<li>{f'<b>{esc(who)}</b>: ' if who and several else ''}{esc(n)}</li>" for n, who in dict.fromkeys(notes)

@@ -47,3 +47,11 @@ def test_a_file_whose_name_looks_like_a_pattern_is_one_file(folder: Path) -> Non
 def test_a_pattern_that_is_none_is_bad_input(folder: Path) -> None:
     with pytest.raises(InputError, match="cannot be searched for files"):
         named_files("a**/*\0", ())
+
+
+def test_names_with_numbers_are_in_the_order_of_the_numbers(tmp_path: Path) -> None:
+    for name in ("leg10.plan", "leg2.plan", "a9/x.plan", "a10/x.plan", "leg.plan"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text("")
+    found = [p.relative_to(tmp_path).as_posix() for p in named_files(str(tmp_path), [".plan"])]
+    assert found == ["a9/x.plan", "a10/x.plan", "leg2.plan", "leg10.plan", "leg.plan"]

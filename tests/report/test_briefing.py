@@ -1,10 +1,11 @@
-"""The printed briefing: what a crew reads and signs, on one page of A4 and Letter for a fleet of four."""
+"""The printed briefing: what a crew reads and signs, on two pages of A4 and Letter for a fleet of four."""
 
 from __future__ import annotations
 
 import base64
 import re
 from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
@@ -15,6 +16,7 @@ from gcsplan.notes.note import Note
 from gcsplan.report.page import render_page
 from gcsplan.report.parts import html as markup
 from gcsplan.report.parts.page_data import Page, Rehearsed
+from gcsplan.world.geodesy.daylight import daylight
 from tests.support import browser as chromium
 from tests.support.noted import saying
 from tests.support.pages import HOSTILE, Reader, fleet_page, small_page
@@ -104,7 +106,7 @@ def test_its_map_refers_to_the_reports_own_and_repeats_no_picture() -> None:
 @pytest.mark.slow
 @pytest.mark.skipif(PROGRAM is None, reason="no browser is installed")
 @pytest.mark.parametrize("worst", [False, True], ids=["plain", "worst"])
-def test_the_briefing_of_four_vehicles_is_one_page_of_a4_and_of_letter(tmp_path: Path, worst: bool) -> None:
+def test_the_briefing_of_four_vehicles_is_two_pages_of_a4_and_of_letter(tmp_path: Path, worst: bool) -> None:
     assert PROGRAM is not None
     page = fleet_of_four(worst=worst)
     file = tmp_path / "report.html"
@@ -112,14 +114,43 @@ def test_the_briefing_of_four_vehicles_is_one_page_of_a4_and_of_letter(tmp_path:
     with chromium.browser(PROGRAM, tmp_path / "home") as made:
         made.visit(file)
         assert made.evaluate("document.getElementById('briefing').offsetHeight") == 0  # not on the screen
-        made.evaluate("for (const e of [...document.body.children]) if (e.tagName !== 'SCRIPT' && e.id !== 'briefing') "
-                      "e.style.display = 'none'")  # fmt: skip
-        made.evaluate("document.getElementById('briefing').style.breakAfter = 'auto'")  # nothing follows here
+        made.evaluate("for (const e of [...document.body.children]) if (e.tagName !== 'SCRIPT' && "
+                      "!e.id.startsWith('briefing')) e.style.display = 'none'")  # fmt: skip
+        made.evaluate("document.getElementById('briefing-2').style.breakAfter = 'auto'")  # nothing follows here
         made.ask("Emulation.setEmulatedMedia", media="")
         for paper, (wide, tall) in PAPERS_IN.items():
             printed = base64.b64decode(made.ask("Page.printToPDF", paperWidth=wide, paperHeight=tall)["data"])
-            assert len(re.findall(rb"/Type\s*/Page\b(?!s)", printed)) == 1, paper
+            assert len(re.findall(rb"/Type\s*/Page\b(?!s)", printed)) == 2, paper
         made.evaluate("window.dispatchEvent(new Event('beforeprint'))")
-        high_mm = made.evaluate("document.getElementById('briefing').getBoundingClientRect().height") / 96 * 25.4
-        assert high_mm < 279.4 - 28.0, high_mm
+        for part in ("briefing", "briefing-2"):
+            high_mm = made.evaluate(f"document.getElementById('{part}').getBoundingClientRect().height") / 96 * 25.4
+            assert high_mm < 279.4 - 28.0, (part, high_mm)
         assert made.complaints() == []
+
+
+def test_the_second_page_has_way_points_parameters_and_failsafes() -> None:
+    page = fleet_of_four(worst=False)
+    text = briefing(page)
+    assert "still air: times, energies and paths count no wind" in text
+    assert "Way points of uav1" in text
+    for leg in page.subjects[0].verdict.legs:
+        assert " ".join(markup.num(leg.end[2], 0, page.units.amsl).split()) in text
+    assert "Daylight is not known" in text
+    light = daylight(51.4779, 0.0, datetime(2026, 6, 21, 12, tzinfo=UTC))
+    assert "Daylight at the start on 2026-06-21: sunrise 03:4" in briefing(replace(page, daylight=light))
+    night = daylight(78.2, 15.6, datetime(2026, 12, 21, 12, tzinfo=UTC))
+    assert "on 2026-12-21: the sun does not rise." in briefing(replace(page, daylight=night))
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(PROGRAM is None, reason="no browser is installed")
+def test_no_table_is_wider_than_the_printed_page(tmp_path: Path) -> None:
+    assert PROGRAM is not None
+    file = tmp_path / "report.html"
+    file.write_text(render_page(fleet_of_four(worst=True)), encoding="utf-8")
+    with chromium.browser(PROGRAM, tmp_path / "home") as made:
+        made.visit(file)
+        made.ask("Emulation.setEmulatedMedia", media="print")
+        made.evaluate("for (const e of document.querySelectorAll('details')) e.open = true")
+        widest = "Math.max(...[...document.querySelectorAll('table')].map((t) => t.getBoundingClientRect().width))"
+        assert made.evaluate(widest) <= 180.0 / 25.4 * 96.0 + 1.0

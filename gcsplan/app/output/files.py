@@ -34,6 +34,7 @@ from gcsplan.units import METRIC, Units
 
 if TYPE_CHECKING:
     from gcsplan.app.upload.job import JobResult
+    from gcsplan.check.difference import PlanDifference
     from gcsplan.check.returns.verdict import WayHome
     from gcsplan.world.terrain.geoid import GeoidGrid
 
@@ -83,12 +84,13 @@ def _rally_items(home: WayHome) -> tuple[MissionItem, ...]:
 
 
 def report_of(
-    plan: Plan, results: Sequence[JobResult] = (), homes: Homes = MappingProxyType({}), units: Units = METRIC
-) -> str:
+    plan: Plan, results: Sequence[JobResult] = (), homes: Homes = MappingProxyType({}), units: Units = METRIC,
+    differences: Sequence[PlanDifference] = (),
+) -> str:  # fmt: skip
     """``report.html``: one page that needs no network."""
     from gcsplan.app.output.report import render
 
-    return render(plan, results, homes, units)
+    return render(plan, results, homes, units, differences)
 
 
 def figures_of(plan: Plan) -> dict[str, bytes]:

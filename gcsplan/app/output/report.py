@@ -11,24 +11,31 @@ import numpy as np
 from gcsplan.app.plan.model import Plan
 from gcsplan.app.upload.job import JobResult
 from gcsplan.app.upload.on_board import settings_of_plan
+from gcsplan.check.difference import PlanDifference
 from gcsplan.check.returns.verdict import WayHome
 from gcsplan.fleet.motion.timing import TimedPath
+from gcsplan.mission_file.published.times import hours_of
 from gcsplan.report.page import render_page
 from gcsplan.report.parts.html import stated
 from gcsplan.report.parts.page_data import Certificate, Compared, Page, Rehearsed, Subject
 from gcsplan.sim.flight.trace import Trace
 from gcsplan.sim.outcome import Rehearsal
 from gcsplan.units import METRIC, Units
+from gcsplan.world.geodesy.daylight import Daylight, daylight
 
 MOST_IN_ORDER = 100
 """Most names of the order of arrival in one line; the schedule has all."""
 
 
 def render(
-    plan: Plan, results: Sequence[JobResult] = (), homes: Mapping[str, WayHome] | None = None, units: Units = METRIC
-) -> str:
-    """The report of ``plan`` as HTML text, with the results of its uploads. ``homes``: vehicle name to its way home."""
-    return render_page(page_of_plan(plan, results, homes, units))
+    plan: Plan, results: Sequence[JobResult] = (), homes: Mapping[str, WayHome] | None = None, units: Units = METRIC,
+    differences: Sequence[PlanDifference] = (),
+) -> str:  # fmt: skip
+    """The report of ``plan`` as HTML text, with the results of its uploads and the ``differences`` to earlier missions.
+
+    ``homes``: vehicle name to its way home.
+    """
+    return render_page(replace(page_of_plan(plan, results, homes, units), differences=tuple(differences)))
 
 
 def page_of_plan(
@@ -63,8 +70,17 @@ def page_of_plan(
     return Page(
         source.name, plan.world, tuple(subjects), dict(source.inputs), tuple(facts), tuple(dict.fromkeys(plan.notes)),
         fleet.separation if fleet is not None else None, fleet.order if fleet is not None else (), units,
-        left_out=tuple((v.name, v.message) for v in plan.left_out),
+        left_out=tuple((v.name, v.message) for v in plan.left_out), daylight=_daylight(plan),
     )  # fmt: skip
+
+
+def _daylight(plan: Plan) -> Daylight | None:
+    """The daylight at the first start, of the hours for which the mission is planned; None without any."""
+    content = plan.source.content
+    if content is None or not plan.source.vehicles:
+        return None
+    hours = hours_of(content.given.get("at"), content.departure, "at", [], instead=content.at)
+    return None if hours is None else daylight(*plan.source.vehicles[0].start_deg, hours.start)
 
 
 def render_rehearsal(

@@ -21,6 +21,7 @@ from gcsplan.mission_file import MissionFile, VehicleRequest
 from gcsplan.notes.note import Note
 from gcsplan.planners.problem import Problem, Progress, Refusal, Solution, Via, lowest_amsl
 from gcsplan.planners.refusal.suggestions import FILLED
+from gcsplan.units import METRIC
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.geodesy.atmosphere import TROPOPAUSE_M
@@ -106,7 +107,9 @@ def unsafe(verdict: Verdict, vehicle: Vehicle) -> NoMission:
     """The NoMission for a verdict with findings: a path was found, but its mission breaks limits as it is flown."""
     words = "\n".join(f"  {f.message}" for f in verdict.findings[:8])
     if all(f.kind == "battery" for f in verdict.findings):
-        return NoMission(f"{vehicle.name}: {verdict.findings[0].message}", reason="battery")
+        note = verdict.findings[0].note
+        cure = Note("battery_that_would_do", key_name=vehicle.energy.battery_key, enough=_enough(verdict, vehicle))
+        return NoMission(f"{vehicle.name}: {note.in_units(METRIC)}; {cure}", reason="battery")
     items, first = verdict.mission.items, verdict.mission.first_seq
     returns = {i + first for i, item in enumerate(items) if item.command == cmd.RTL}
     if any(f.seq in returns for f in verdict.findings):
@@ -120,6 +123,17 @@ def unsafe(verdict: Verdict, vehicle: Vehicle) -> NoMission:
         f"{vehicle.name}: a path was found, but the mission as {vehicle.autopilot} flies it breaks limits:\n{words}",
         reason="not_found",
     )
+
+
+def _enough(verdict: Verdict, vehicle: Vehicle) -> str:
+    """The least battery of three digits, in the unit that the mission file has it in, with which the flight passes."""
+    energy = vehicle.energy
+    least = verdict.energy_j / (1.0 - energy.reserve) / energy.battery_unit_j
+    step = 10.0 ** (math.floor(math.log10(least)) - 2)
+    units = math.ceil(least / step)
+    while verdict.energy_j > (1.0 - energy.reserve) * (units * step * energy.battery_unit_j):
+        units += 1
+    return f"{units * step:.10g}"
 
 
 def make_problem(

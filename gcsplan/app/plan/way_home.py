@@ -7,11 +7,14 @@ judged. Otherwise the return is judged on request, and an unsafe one is a warnin
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from gcsplan.app.plan.model import Plan, VehiclePlan
+from gcsplan.check.returns.proposal import ALIKE_M, ReturnProposal, best_first
+from gcsplan.check.returns.words import together_m
 from gcsplan.check.verdict import Verdict
 from gcsplan.errors import CheckFailed, NoMission
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
@@ -20,6 +23,7 @@ from gcsplan.mavlink.mission.return_parameters import (
     return_on_board_m,
     returns_otherwise,
     route_setting,
+    setting,
     takes_another_route,
 )
 from gcsplan.mission_file import MissionFile, VehicleRequest
@@ -72,33 +76,97 @@ def home_of(
 def homes_of(plan: Plan) -> dict[str, WayHome]:
     """The way home of every vehicle of a plan."""
     error_m = plan.source.terrain_error_m
-    return {v.name: _with_path_back(v, home_of(v.verdict, v.request, plan.world, error_m)) for v in plan.vehicles}
+    return {v.name: _with_proposals(v, home_of(v.verdict, v.request, plan.world, error_m)) for v in plan.vehicles}
 
 
-def _with_path_back(v: VehiclePlan, home: WayHome) -> WayHome:
-    """``home``, and what a return path back along the track would do if no return altitude makes all returns safe."""
-    enough = home.safe is not False or (home.set_rel_home_m is not None and not home.set_leaves_m)
-    request, brief = v.request, v.brief
-    if enough or brief is None or home.route == "mission" or not writes_path_back(request, brief.source.altitude_frame):
+def _with_proposals(v: VehiclePlan, home: WayHome) -> WayHome:
+    """``home`` with the changes that make more of it safe, each tried, the best first.
+
+    An altitude that makes all returns safe, within max AGL, is enough; otherwise the highest one within it, rally
+    points and a return path back along the track are tried, too.
+    """
+    if home.safe is not False or v.brief is None or home.route == "mission":
         return home
+    tried = _by_altitude(v, home)
+    if not (home.set_rel_home_m is not None and not home.set_leaves_m and not home.set_above_max_agl):
+        path = _path_back(v)
+        tried += [] if path is None else [_by_mission(v, path)]
+        enough = home.set_rel_home_m is not None and not home.set_leaves_m
+        if (
+            path is not None
+            and not enough
+            and path.no_return_m < min([home.no_return_m, *(p.leaves_m for p in tried[:-1])])
+        ):
+            route = route_setting(v.request.vehicle.autopilot, path=True)
+            note = Note("path_back_helps", left_m=path.no_return_m, setting=route)
+            home = replace(home, path_back=Note("path_back_makes_safe", setting=route) if path.safe else note)
+    better = [p for p in tried if p.leaves_m < home.no_return_m - ALIKE_M or not p.leaves_m]
+    return replace(home, proposals=best_first(better))
+
+
+def _by_altitude(v: VehiclePlan, home: WayHome) -> list[ReturnProposal]:
+    """The altitude to set, also with rally points, and the highest one within max AGL."""
+    found: list[ReturnProposal] = []
+    ceiling_m = None if home.max_agl_m is None else float(math.floor(home.max_agl_m))
+    heights = [home.set_rel_home_m, ceiling_m if home.set_above_max_agl else None]
+    for height_m in dict.fromkeys(h for h in heights if h is not None and h > 0.0):
+        known = height_m == home.set_rel_home_m and not home.rally
+        then = None if known else _judged_at(v, height_m)
+        if then is not None and then.not_judged:
+            continue
+        left_m = (home.set_leaves_m or 0.0) if then is None else then.no_return_m
+        found.append(_altitude(home, height_m, left_m))
+        if then is not None and home.rally and height_m == home.set_rel_home_m:
+            # The battery counts as for a return home, which is farther than one to the nearest place.
+            short = then.battery.short if then.battery is not None else ()
+            left_m = together_m([*((s.from_m, s.to_m) for s in home.left), *short])
+            found.append(_altitude(home, height_m, left_m, rally=len(home.rally)))
+    return found
+
+
+def _altitude(home: WayHome, height_m: float, left_m: float, rally: int = 0) -> ReturnProposal:
+    above = home.max_agl_m is not None and height_m > home.max_agl_m
+    note = Note(
+        "return_by_altitude", height_m=height_m, setting=setting(home.autopilot, height_m),
+        above=Note("above_max_agl", max_agl_m=home.max_agl_m) if above else None,
+        rally=Note("with_rally_points", count=rally) if rally else None,
+    )  # fmt: skip
+    return ReturnProposal(note, left_m, (("rtl_rel_home_m", height_m),), above_max_agl=above)
+
+
+def _by_mission(v: VehiclePlan, path: WayHome) -> ReturnProposal:
+    route = route_setting(v.request.vehicle.autopilot, path=True)
+    note = Note("return_by_mission", setting=route)
+    return ReturnProposal(note, path.no_return_m, (("return_route", "mission"),))
+
+
+def _judged_at(v: VehiclePlan, rel_home_m: float) -> WayHome:
+    """The way home at another altitude, without rally points."""
+    from gcsplan.check.returns.way_home import way_home
+
+    assert v.brief is not None
+    return way_home(
+        v.verdict, v.request.vehicle, v.brief.world, rtl_rel_home_m=rel_home_m,
+        terrain_error_m=v.brief.source.terrain_error_m, rally=False, route=v.request.return_route,
+    )  # fmt: skip
+
+
+def _path_back(v: VehiclePlan) -> WayHome | None:
+    """The way home along a return path back along the track; None if none can be written, flown or judged."""
+    request, brief = v.request, v.brief
+    if brief is None or not writes_path_back(request, brief.source.altitude_frame):
+        return None
     from gcsplan.app.plan.problem import built
 
     try:
         _, verdict = built(brief, request, v.solution, replace(v.order, return_path=True))
     except NoMission:  # too many items
-        return home
+        return None
     if verdict.findings:
-        return home
+        return None
     error_m = brief.source.terrain_error_m
     path = home_of(verdict, replace(request, return_route="mission"), brief.world, error_m)
-    if path.not_judged or path.no_return_m >= (
-        home.set_leaves_m if home.set_leaves_m is not None else home.no_return_m
-    ):
-        return home
-    route = route_setting(request.vehicle.autopilot, path=True)
-    if path.safe:
-        return replace(home, path_back=Note("path_back_makes_safe", setting=route))
-    return replace(home, path_back=Note("path_back_helps", left_m=path.no_return_m, setting=route))
+    return None if path.not_judged else path
 
 
 def writes_path_back(request: VehicleRequest, altitude_frame: str) -> bool:
@@ -134,10 +202,12 @@ def require(homes: Mapping[str, WayHome | None], *, required: bool) -> None:
 
 
 def _lines(name: str, home: WayHome | None, wording: Wording = IN_FILES) -> list[str]:
-    """The headline, what to set, and what a return path would do."""
+    """The headline, what to set, what a return path would do, and all that was tried if that is more."""
     if home is None:
         return [f"{name}: the return was not judged"]
-    notes = (home.headline, home.advice, home.path_back)
+    several = len(home.proposals) > 1
+    tried = Note("proposals_tried", proposals=tuple(p.note for p in home.proposals)) if several else None
+    notes = (home.headline, home.advice, home.path_back, tried)
     return [f"{name}: {note.text(wording)}" for note in notes if note is not None]
 
 

@@ -61,6 +61,9 @@ WING_ATTEMPTS = 5
 MOST_JOINTS = 8
 """Most pairs of climb-out and approach for which a path is searched."""
 
+LONG_CLIMB_OUT_M = 1000.0
+"""A straight climb-out from here on, m, is one for which a climbing circle is offered."""
+
 MOST_REFUSED = 3
 """Most pairs without a path: it may be that another climb-out leaves room for the first turn."""
 
@@ -131,7 +134,8 @@ def _joined(
             bound = bound_between(brief, inner, solution.path.points, start, goal, vehicle, world)
             solution = with_bound(solution, bound, problem)
         speed = vehicle.speed_max_m_s
-        return VehiclePlan(request, inner, solution, mission, verdict, speed, tuple(_notes(start, goal)), order, over)
+        notes = (*_notes(start, goal), *_circles_instead(problem, limited, sharp, start))
+        return VehiclePlan(request, inner, solution, mission, verdict, speed, notes, order, over)
     if refused and not why:
         raise refused[0] from refused[0].__cause__
     raise NoMission(
@@ -206,6 +210,12 @@ def starts(problem: Problem, request: VehicleRequest, sharp: Floats) -> Iterator
     heading = None if given is None else math.radians(90.0 - given)
     rules = _EndRules(problem, over=over_m(request.vehicle))
     required = RequiredEnd(np.array(request.start), slope, request.takeoff_agl_m, heading, rules)
+    if request.climb_out == "circles":
+        return _some(
+            circling_ends(problem, required, sharp),
+            f"{request.vehicle.name}: no climb-out in circles clears the ground, the zones and the ceiling: write "
+            f"climb_out: straight, or give another start",
+        )
     straight = straight_ends(problem, required, sharp)
     first = next(straight, None)
     which = "on any heading" if given is None else f"on takeoff_heading_deg {given:g}"
@@ -293,6 +303,21 @@ def _order(brief: Brief, request: VehicleRequest, start: FlightEnd, goal: Flight
         None if start.circle is None else numbers_of(start.circle), start.circle_m,
     )  # fmt: skip
     return Order(request.end, brief.source.altitude_frame, wing=wing)
+
+
+def _circles_instead(problem: Problem, request: VehicleRequest, sharp: Floats, start: FlightEnd) -> Iterator[Note]:
+    """The climbing circle that may take the place of a climb-out of kilometres, if one is clear."""
+    if start.circle is not None or math.dist(start.top[:2], start.ground[:2]) < LONG_CLIMB_OUT_M:
+        return
+    try:
+        circles = next(starts(problem, replace(request, climb_out="circles"), sharp))
+    except NoMission:
+        return
+    assert circles.circle is not None
+    yield Note(
+        "circles_instead", far_m=math.dist(circles.top[:2], circles.ground[:2]), circle_m=abs(circles.circle_m),
+        up_m=float(circles.circle[2] - circles.ground[2]),
+    )  # fmt: skip
 
 
 def _notes(start: FlightEnd, goal: FlightEnd | None) -> Iterator[Note]:

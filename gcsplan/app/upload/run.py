@@ -40,7 +40,7 @@ from gcsplan.export.outdir import write_whole
 from gcsplan.mavlink.files.formats import read_mission_file, write_plan, write_waypoints
 from gcsplan.mavlink.link.url import parse_url
 from gcsplan.mavlink.mission.autopilots import autopilot_of
-from gcsplan.mavlink.mission.mission import FENCE, MISSION, RALLY, Mission
+from gcsplan.mavlink.mission.mission import FENCE, MISSION, RALLY, Home, Mission
 from gcsplan.mission_file import MissionFile
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Vehicle
@@ -507,6 +507,21 @@ def download_to(url: str, sysid: int, file: Path, *, timeout_s: float = 60.0) ->
     text = write_plan(mission) if file.suffix.lower() == ".plan" else write_waypoints(mission)
     write_whole(file, text)
     return len(mission.wire_items())
+
+
+def on_board(source: MissionFile, where: Mapping[str, str], *, timeout_s: float = 60.0) -> dict[str, Mission]:
+    """The missions on board by vehicle; ``where``: name to URL. Raises LinkError, VehicleRefused, InputError."""
+    from gcsplan.mavlink.link.session import session
+
+    found: dict[str, Mission] = {}
+    options = session.SessionOptions(listen_s=0.0, timeout_s=timeout_s)
+    for request in (r for r in source.vehicles if r.vehicle.name in where):
+        vehicle, home = request.vehicle, Home.at(*request.start_deg, request.start[2])
+        with open_link(where[vehicle.name]) as link:
+            found[vehicle.name] = session.download_mission(
+                link, vehicle.sysid, vehicle.autopilot, home=home, name=vehicle.name, options=options
+            )
+    return found
 
 
 def clear(url: str, sysid: int, kind: str, *, allow_armed: bool = False, timeout_s: float = 60.0) -> None:

@@ -8,6 +8,7 @@ from typing import Any
 
 from gcsplan.check.battery import BatteryHome
 from gcsplan.check.motion.stretch import Place
+from gcsplan.check.returns.proposal import ReturnProposal
 from gcsplan.check.returns.words import ReturnRow, listed, together_m, verdict_words
 from gcsplan.mavlink.mission.return_parameters import ReturnRoute, route_setting, setting, settings
 from gcsplan.notes.note import IN_FILES, Note, Wording, in_json
@@ -170,6 +171,7 @@ class WayHome:
     ``starts``; ``along_path``: along a return path, else to a landing sequence. Altitudes say nothing then.
     ``path_back``: what a return path along the mission's own track would do, where no altitude is enough; mostly None.
     ``max_agl_m``: the limit on heights above ground, which a return at a greater altitude breaks over home at least.
+    ``proposals``: changes that were tried and leave less unsafe, the best first.
     """
 
     vehicle: str
@@ -199,6 +201,7 @@ class WayHome:
     along_path: bool = False
     path_back: Note | None = None
     max_agl_m: float | None = None
+    proposals: tuple[ReturnProposal, ...] = ()
 
     @property
     def safe(self) -> bool | None:
@@ -291,6 +294,7 @@ class WayHome:
             "battery": None if self.battery is None else self.battery.as_dict(),
             "lowest_agl_m": None if self.lowest is None else self.lowest.agl_m,
             "advised_rel_home_m": self.advised_rel_home_m,
+            "proposals": [p.as_dict(wording) for p in self.proposals],
             "rally": [r.as_dict(wording) for r in self.rally],
             "left": [s.as_dict(wording) for s in self.left],
             **in_json("not_judged", self.not_judged, wording),
@@ -311,6 +315,7 @@ class WayHome:
             out.append(ReturnRow("set", self.advice))
         if self.path_back is not None:
             out.append(ReturnRow("path_back", self.path_back))
+        out += [ReturnRow("proposal", p.note) for p in self.proposals if len(self.proposals) > 1]
         out += [ReturnRow("no_return", Note("from_stretch", stretch=s.described())) for s in worst_first(self.unsafe)]
         if self.irregular:
             first, length = self.irregular[0].described(legal=True), self._irregular_m

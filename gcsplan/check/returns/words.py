@@ -12,6 +12,7 @@ PATH = {True: Note("path_safe"), False: Note("path_unsafe"), None: Note("path_no
 
 LABELS = {
     "judged_at": "judged at", "judged_as": "judged as", "set": "on the vehicle", "path_back": "instead",
+    "proposal": "tried, the best first",
     "no_return": "no safe return", "irregular": "outside a limit", "clear": "clear of ground and zones",
     "legal": "within all limits too", "lowest": "lowest on a return", "battery": "battery for the return",
     "rally": "rally point", "still_no_return": "still no safe return", "not_judged": "not judged",

@@ -11,6 +11,19 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from gcsplan.cli.arguments import completion
+from gcsplan.cli.arguments.changes import (
+    AvoidFileOption,
+    AvoidOption,
+    GoalOption,
+    MaxAglOption,
+    MinAglOption,
+    SaveOption,
+    SpeedOption,
+    StartOption,
+    ViaOption,
+    ZonesInsteadOption,
+    changes_of,
+)
 from gcsplan.cli.arguments.options import (
     LINKS,
     ArmedOption,
@@ -43,10 +56,13 @@ from gcsplan.errors import CheckFailed, InputError, NoMission, UsageError
 
 if TYPE_CHECKING:
     from gcsplan.app.fleet.start_time import GateTime
+    from gcsplan.app.plan.earlier import EarlierMission
     from gcsplan.app.plan.model import Plan
-    from gcsplan.app.upload.job import JobResult, UploadJob, UploadOptions
+    from gcsplan.app.upload.job import JobResult, UploadJob
+    from gcsplan.check.difference import PlanDifference
     from gcsplan.check.returns.verdict import WayHome
     from gcsplan.mission_file import MissionFile
+    from gcsplan.mission_file.changes import MissionChange
     from gcsplan.notes.note import Note
     from gcsplan.units import Units
 
@@ -84,6 +100,16 @@ def plan(
     ] = None,
     planner: PlannerOption = None,
     objective: ObjectiveOption = None,
+    avoid: AvoidOption = None,
+    avoid_file: AvoidFileOption = None,
+    zones: ZonesInsteadOption = None,
+    max_agl: MaxAglOption = None,
+    min_agl: MinAglOption = None,
+    start: StartOption = None,
+    goal: GoalOption = None,
+    via: ViaOption = None,
+    speed: SpeedOption = None,
+    save: SaveOption = False,
     seed: SeedOption = None,
     encoding: EncodingOption = None,
     cost: CostOption = None,
@@ -105,12 +131,29 @@ def plan(
             "second. ArduCopter alone; needs --allow-unjudged, for nobody knows how long it will wait.",
         ),
     ] = None,
+    compare_to: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="WHERE",
+            autocompletion=completion.words("link"),
+            help="Say what changes to the missions on board, too: a URL for all vehicles, NAME=URL for one, or `link`. "
+            "Nothing is written to a vehicle.",
+        ),
+    ] = None,
     at: AtOption = None,
     report: Annotated[
         bool, typer.Option("--report", help="Also write report.html: map, profiles, way home, fleet; one page.")
     ] = False,
     way_home: WayHomeOption = False,
     require_way_home: RequireWayHomeOption = False,
+    apply: Annotated[
+        bool,
+        typer.Option(
+            "--apply",
+            help="Take the best change that is tried for the way home: plan with it, and write it into the "
+            "mission file.",
+        ),
+    ] = False,
     rally: Annotated[
         bool,
         typer.Option(
@@ -150,6 +193,7 @@ def plan(
 ) -> None:
     """Plan a mission file, write its outputs, and upload and verify them on request.
 
+    Options such as --avoid, --max-agl or --goal change the mission for this run, and --save writes them into its file.
     Without --upload nothing is sent. The outputs are written whole or not at all. If no safe mission exists, earlier
     outputs are moved to DIR/previous, so that no old mission is flown by mistake. One vehicle without a mission refuses
     a whole fleet, unless it may be left out.
@@ -158,55 +202,55 @@ def plan(
     from gcsplan.app.fleet.may_fly import flyable
     from gcsplan.app.fleet.start_time import GateTime
     from gcsplan.app.output import files as outputs
-    from gcsplan.app.plan.way_home import is_required
-    from gcsplan.cli.output.console import plan_table, release_table, remark, upload_table
-    from gcsplan.cli.output.progress import planning_display
-    from gcsplan.cli.output.verdict_table import say_homes
+    from gcsplan.cli.output.console import release_table, remark, upload_table
     from gcsplan.export.outdir import settle_outputs
     from gcsplan.mission_file.source import file_of
+    from gcsplan.notes.note import in_json
     from gcsplan.units import units_of
 
     system = units_of(units)
     if list_zones:
         return _list_zones(mission, system, upload, as_json, at)
     directory = Path(file_of(mission).stem) if out is None else out
+    changes = changes_of(
+        avoid, avoid_file, zones, {"max_agl_m": max_agl, "min_agl_m": min_agl}, {"start": start, "goal": goal}, via,
+        speed, terrain_keys(vertical_datum, height_unit, nodata),
+    )  # fmt: skip
     gate = None if gate_utc is None else GateTime.parse(gate_utc, datetime.now(UTC))
     each = _require_options(planner, objective, png, directory)
     if settle_outputs(directory):
         remark(f"an earlier run was cut off while it wrote to {directory}: the outputs before it were put back")
     source: MissionFile | None = None
     try:
-        read = terrain_keys(vertical_datum, height_unit, nodata)
         depart = None if gate is None else gate.start
-        source = pipeline.load_mission(mission, departure=depart, at=at, terrain=read)
+        source = pipeline.load_mission(mission, departure=depart, at=at, changes=changes)
+        _begin_changes(source, save=save)
         targets: dict[str, str] = {}
-        if upload or fence or fence_infinite:  # otherwise the upload modules need not be imported
-            from gcsplan.app.upload import fence as fencing
+        if upload:  # otherwise the upload modules need not be imported
             from gcsplan.app.upload import run as uploads
-            from gcsplan.app.upload.job import UploadOptions
 
-            targets = uploads.targets(upload or [], [r.vehicle for r in source.vehicles])
-        names = [r.vehicle.name for r in source.vehicles]
-        with planning_display(names, objective or source.planner.objective) as progress:
-            planned = pipeline.plan(
-                source, planner=planner, objective=objective, seed=seed,
-                options=_given(encoding=encoding, cost=cost, warm_start=warm_start),
-                progress=progress, gate_utc=depart, jobs=jobs, cluster=cluster, leave_out=leave_out or None,
-            )  # fmt: skip
-        planned, homes = flyable(
-            planned, allow_unjudged=allow_unjudged, home=report or way_home or rally, require_way_home=require_way_home
-        )
-        orders: list[UploadJob] = []
-        if upload or fence or fence_infinite:
-            where = targets or dict.fromkeys((v.name for v in planned.vehicles), "")
-            orders = uploads.jobs_of(planned, where, homes, is_required(source, require_way_home), rally=rally)
-        list_notes: Sequence[tuple[str, Note]] = ()
-        if orders:  # a fence that the mission would breach is refused before anything is written
-            orders, list_notes = fencing.with_lists(orders, fencing.ListsSent(fence, rally, fence_infinite))
+            targets = uploads.targets(upload, [r.vehicle for r in source.vehicles])
+        earlier = _earlier(source, directory, compare_to or [], timeout)
+        how = {
+            "planner": planner, "objective": objective, "seed": seed, "gate_utc": depart, "jobs": jobs,
+            "options": _given(encoding=encoding, cost=cost, warm_start=warm_start), "cluster": cluster,
+            "leave_out": leave_out or None,
+        }  # fmt: skip
+        planned = _plan(source, how)
+        if apply and (best := _best_changes(planned)):
+            source = pipeline.load_mission(mission, departure=depart, at=at, changes=[*changes, *best])
+            planned = _plan(source, how)
+        keep = _keeping(source, mission, save=save or (apply and bool(best)))
+        home = report or way_home or rally or apply
+        planned, homes = flyable(planned, allow_unjudged=allow_unjudged, home=home, require_way_home=require_way_home)
+        homes = _with_earlier_landing(planned, homes)
+        lists = (fence, rally, fence_infinite)
+        orders, list_notes = _orders(planned, targets, homes, require_way_home, lists)
         fences = {job.name: job.fence.items for job in orders if job.fence is not None}
+        changes_since = _differences(planned, earlier)
         files = outputs.outputs_of(planned, homes, fences, rally=rally)
         if report:
-            files["report.html"] = outputs.report_of(planned, (), homes, system)
+            files["report.html"] = outputs.report_of(planned, (), homes, system, changes_since)
     except UsageError:
         raise  # a mistake on the command line does not invalidate an earlier mission
     except (InputError, NoMission, CheckFailed):
@@ -214,37 +258,168 @@ def plan(
         raise
     pictures = {} if png is None else _pictures(planned, png, each)
     _write(directory, files, pictures, later=["upload.json"] if targets else [])
+    keep()
     if not as_json:
-        plan_table(planned, homes, system)
-        say_homes(homes, system)
+        _show(planned, homes, changes_since, system)
         _say_written(directory, list(files), list_notes, system)
     results: list[JobResult] = []
     if targets:
-        options = UploadOptions(
-            allow_armed=allow_armed, ignore_position=ignore_position, allow_parameters=allow_parameters, atomic=atomic,
-            timeout_s=timeout,
+        results = _upload(
+            orders, gate, allow_armed=allow_armed, ignore_position=ignore_position, allow_parameters=allow_parameters,
+            atomic=atomic, timeout_s=timeout,
         )  # fmt: skip
-        results = _upload(orders, options, gate)
-        _add_results(directory, planned, results, homes, system if report else None)
+        _add_results(directory, planned, results, homes, system if report else None, changes_since)
         if not as_json:
             upload_table(results, units=system)
             release_table(planned, results, gate)
     left_out = _left_out(planned, mission)
     failure = (uploads.failure(results) if targets else None) or left_out
     if as_json:
-        emit(outputs.summary_of(planned, results, homes), failure)
+        more = in_json("changes", source.changes) | {"differences": [d.as_dict() for d in changes_since]}
+        emit(outputs.summary_of(planned, results, homes) | more, failure)
     raise typer.Exit(failure["code"] if failure is not None else 0)
 
 
+def _earlier(
+    source: MissionFile, directory: Path, compare_to: list[str], timeout_s: float
+) -> list[dict[str, EarlierMission]]:
+    """The missions of the last plan, and those on board where these are to be compared, each by vehicle."""
+    from gcsplan.export.outdir import outputs_in
+
+    found: list[dict[str, EarlierMission]] = []
+    if outputs_in(directory):
+        from gcsplan.app.plan.earlier import last_plan
+        from gcsplan.cli.output.console import say_notes
+
+        last, notes = last_plan(source, directory)
+        say_notes(notes)
+        found.append(last)
+    if compare_to:
+        from gcsplan.app.plan.earlier import EarlierMission
+        from gcsplan.app.upload import run as uploads
+        from gcsplan.app.upload.job import SIM
+
+        where = uploads.targets(compare_to, [r.vehicle for r in source.vehicles])
+        if SIM in where.values():
+            raise UsageError("--compare-to sim: a simulated vehicle has nothing on board; give a URL, or `link`")
+        with talking(list(where)):
+            missions = uploads.on_board(source, where, timeout_s=timeout_s)
+        found.append({name: EarlierMission(where[name], mission) for name, mission in missions.items()})
+    return found
+
+
+def _differences(planned: Plan, earlier: Sequence[Mapping[str, EarlierMission]]) -> list[PlanDifference]:
+    """What changed for each vehicle, by the missions that it is compared with."""
+    if not any(earlier):
+        return []
+    from gcsplan.app.plan.earlier import differences
+
+    return [difference for missions in earlier for difference in differences(planned, missions).values()]
+
+
+def _orders(
+    planned: Plan, targets: Mapping[str, str], homes: Mapping[str, WayHome], require_way_home: bool,
+    lists: tuple[bool, bool, bool],
+) -> tuple[list[UploadJob], Sequence[tuple[str, Note]]]:  # fmt: skip
+    """What is sent to each vehicle, with its ``lists`` (fence, rally points, infinite fence), and the notes on them.
+
+    A fence that the mission would breach is refused here, before anything is written.
+    """
+    fence, rally, infinite = lists
+    if not (targets or fence or infinite):
+        return [], ()
+    from gcsplan.app.plan.way_home import is_required
+    from gcsplan.app.upload import fence as fencing
+    from gcsplan.app.upload import run as uploads
+
+    where = targets or dict.fromkeys((v.name for v in planned.vehicles), "")
+    orders = uploads.jobs_of(planned, where, homes, is_required(planned.source, require_way_home), rally=rally)
+    return fencing.with_lists(orders, fencing.ListsSent(fence, rally, infinite)) if orders else ([], ())
+
+
+def _show(planned: Plan, homes: Mapping[str, WayHome], changes_since: Sequence[PlanDifference], units: Units) -> None:
+    """Print the plan, what changed, and the ways home."""
+    from gcsplan.cli.output.console import plan_table
+    from gcsplan.cli.output.difference_table import say_differences
+    from gcsplan.cli.output.verdict_table import say_homes
+
+    plan_table(planned, homes, units)
+    say_differences(changes_since, units)
+    say_homes(homes, units)
+
+
+def _plan(source: MissionFile, how: Mapping[str, Any]) -> Plan:
+    """The plan of a mission, with its progress shown; ``how`` are options of `gcsplan.plan`."""
+    from gcsplan.app.fleet import pipeline
+    from gcsplan.cli.output.progress import planning_display
+
+    names = [r.vehicle.name for r in source.vehicles]
+    with planning_display(names, how["objective"] or source.planner.objective) as progress:
+        return pipeline.plan(source, progress=progress, **how)
+
+
+def _best_changes(planned: Plan) -> list[MissionChange]:
+    """The best change for the way home of each vehicle that has one; a vehicle that lacks both is named."""
+    from gcsplan.app.fleet.earlier_landing import best_changes, with_earlier_landing
+    from gcsplan.app.plan.way_home import homes_of
+    from gcsplan.cli.output.console import remark
+
+    homes = with_earlier_landing(planned, homes_of(planned))
+    for name, home in homes.items():
+        if home.safe is not True and not home.proposals:
+            remark(f"note: --apply: nothing that was tried makes more of the way home of {name} safe")
+    return best_changes(homes)
+
+
+def _with_earlier_landing(planned: Plan, homes: dict[str, WayHome]) -> dict[str, WayHome]:
+    """The ways home, with an earlier landing among the proposals where all others leave something unsafe."""
+    if all(home.safe is not False for home in homes.values()):
+        return homes
+    from gcsplan.app.fleet.earlier_landing import with_earlier_landing
+
+    return with_earlier_landing(planned, homes)
+
+
+def _begin_changes(source: MissionFile, *, save: bool) -> None:
+    """Say the changes of a mission, and refuse now what cannot be saved once the plan is written. Raises UsageError."""
+    from gcsplan.cli.output.console import say_notes
+    from gcsplan.mission_file.changes import saving
+
+    say_notes(source.changes)
+    if save and source.content is not None:
+        saving(source.content)
+
+
+def _keeping(source: MissionFile, mission: Path, *, save: bool) -> Callable[[], None]:
+    """The function that saves a mission's changes once the plan is written, if they are to be saved."""
+    from gcsplan.cli.output.console import remark, say_notes
+    from gcsplan.mission_file.changes import saving
+
+    say_notes(note for note in source.changes if note.data["option"] == "--apply")
+    if save:
+        assert source.content is not None
+        write = saving(source.content)
+
+        def keep() -> None:
+            write()
+            remark(f"the changes are written into {mission}")
+
+        return keep
+    if source.changes:
+        remark("note: changed for this run alone; --save writes it into the mission file")
+    return lambda: None
+
+
 def _add_results(
-    directory: Path, planned: Plan, results: list[JobResult], homes: Mapping[str, WayHome], report: Units | None
-) -> None:
+    directory: Path, planned: Plan, results: list[JobResult], homes: Mapping[str, WayHome], report: Units | None,
+    changes_since: Sequence[PlanDifference],
+) -> None:  # fmt: skip
     """Add what an upload came to; ``report``: the units of a report that tells it too, None without one."""
     from gcsplan.app.output import files as outputs
 
     texts = {"upload.json": lambda: outputs.upload_text(planned, results, homes)}
     if report is not None:
-        texts["report.html"] = lambda: outputs.report_of(planned, results, homes, report)
+        texts["report.html"] = lambda: outputs.report_of(planned, results, homes, report, changes_since)
     _add(directory, texts)
 
 
@@ -363,9 +538,10 @@ def _pictures(planned: Plan, png: Path, each: bool) -> dict[Path, bytes]:
     return {png: outputs.picture_of(planned)}
 
 
-def _upload(jobs: list[UploadJob], options: UploadOptions, gate: GateTime | None) -> list[JobResult]:
-    """Upload all jobs with their progress shown."""
+def _upload(jobs: list[UploadJob], gate: GateTime | None, **options: Any) -> list[JobResult]:
+    """Upload all jobs with their progress shown; ``options`` are those of `UploadOptions`."""
     from gcsplan.app.upload import run as uploads
+    from gcsplan.app.upload.job import UploadOptions
     from gcsplan.cli.output.console import transfer_progress
     from gcsplan.sim.vehicle.server import loopback_fleet
 
@@ -373,7 +549,7 @@ def _upload(jobs: list[UploadJob], options: UploadOptions, gate: GateTime | None
         gate.require_ahead(datetime.now(UTC))  # planning took time, so check again
     names = [job.name for job in jobs]
     with talking(names), transfer_progress(names) as moved_on:
-        return uploads.run_jobs(jobs, options, moved_on, simulator=loopback_fleet)
+        return uploads.run_jobs(jobs, UploadOptions(**options), moved_on, simulator=loopback_fleet)
 
 
 def planners(as_json: JsonOption = False) -> None:

@@ -19,6 +19,7 @@ from gcsplan.check.returns.words import verdict_words
 from gcsplan.cli.process.exit import put
 from gcsplan.figures import floored, raised, steepened
 from gcsplan.notes.note import IN_FILES, Note, Wording
+from gcsplan.notes.order import for_people
 from gcsplan.units import KILOJOULE, METRIC, WATT_HOUR, Unit, Units, charge, duration, in_units
 from gcsplan.world.terrain.model_words import heights_line, notes_on, what_is_not_in
 
@@ -155,8 +156,9 @@ def plan_table(plan: Plan, homes: Mapping[str, WayHome], units: Units = METRIC) 
     else:
         _columns_table(title, rows)
     _say_fleet(plan, units)
-    say_notes(plan.notes, Wording(units))
-    say_notes_of([(v.name, note) for v in plan.vehicles for note in v.all_notes(plan.fleet)], Wording(units))
+    noted = [("", note) for note in plan.notes]
+    noted += [(v.name, note) for v in plan.vehicles for note in v.all_notes(plan.fleet)]
+    say_notes_of(for_people(noted), Wording(units))
     say_heights(plan.source.inputs)
     if words := what_is_not_in(plan.source.inputs):
         console.print(words, style="yellow", markup=False)
@@ -317,7 +319,7 @@ def say_notes_of(notes: Sequence[tuple[str, Note]], wording: Wording = IN_FILES)
     names: dict[Note, list[str]] = {}
     for name, note in dict.fromkeys(notes):
         names.setdefault(note, []).append(name)
-    lines = [f"{names_of(of)}: {note.text(wording)}" for note, of in names.items()]
+    lines = [f"{names_of(of)}: {note.text(wording)}" if any(of) else note.text(wording) for note, of in names.items()]
     if len(lines) > MOST_NOTES:
         lines = [*lines[:MOST_NOTES], f"… and {len(lines) - MOST_NOTES} more on vehicles: --json has all"]
     _say_noted(lines)

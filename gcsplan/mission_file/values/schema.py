@@ -239,6 +239,8 @@ class VehicleKeys(LimitKeys):
     """How it returns: straight home, or by the mission's return path or landing sequence; if absent, straight home."""
     takeoff_heading_deg: Annotated[float, Field(ge=0.0, le=360.0)] | None = None
     """Launch heading of a fixed wing; if absent, the planner chooses one."""
+    climb_out: Literal["straight", "circles"] = "straight"
+    """How a fixed wing climbs after its launch: straight ahead, while that is clear, or in circles near its start."""
     speed_m_s: SpeedRange = [3.0, 15.0]
     """Slowest and fastest cruise speed; one number is both. A fixed wing's is the airspeed that it indicates."""
     lean_angle_deg: Annotated[float, Field(ge=10.0, le=80.0)] | None = None

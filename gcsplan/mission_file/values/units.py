@@ -19,6 +19,7 @@ from gcsplan.mission_file.values.keys import Keys
 from gcsplan.mission_file.values.schema import MOST_VOLTS, MissionKeys, shown
 from gcsplan.notes.note import Note
 from gcsplan.units import FOOT, KM_PER_HOUR, KNOT, MILLIAMPERE_HOUR, MINUTE, NAUTICAL_MILE, WATT_HOUR, Unit
+from gcsplan.vehicle import Energy
 
 UNIT_SYMBOLS = {
     "_j_per_m": "J/m", "_m_s3": "m/s³", "_m_s2": "m/s²", "_m_s": "m/s", "_percent": "%", "_deg": "°", "_mb": "MB",
@@ -76,6 +77,15 @@ class Converted:
             if rest != problem.where and rest[:1] in ("", "[", "."):
                 return replace(problem, where=written + rest, message=f"{problem.message} ({how})")
         return problem
+
+    def with_battery_key(self, energy: Energy, place: str) -> Energy:
+        """``energy`` with the key that its battery stands under at ``place`` in the file, and the unit of that key."""
+        if place not in self.given:
+            return energy
+        key = self.given[place][0].rpartition(".")[2]
+        end = next(end for end in OTHERS["_j"] if key.endswith(end))
+        unit_j = OTHERS["_j"][end].size * (energy.battery_v or 1.0 if end == CHARGE else 1.0)
+        return replace(energy, battery_key=key, battery_unit_j=unit_j)
 
 
 def unit_end(key: str) -> str:

@@ -104,23 +104,26 @@ def place(lat_deg: float, lon_deg: float) -> str:
 
 def table(
     caption: str, head: Sequence[str], rows: Iterable[Sequence[str]], *, marks: Sequence[str] = (),
-    numbers: Sequence[int] = (),
+    numbers: Sequence[int] = (), stacked: bool = False,
 ) -> str:  # fmt: skip
     """A table of HTML cells; the first cell of a row is its header. ``marks`` are CSS classes of the rows.
 
-    ``numbers`` are the numbers of the vehicles of the rows, by which the page's filter finds them.
+    ``numbers`` are the numbers of the vehicles of the rows, by which the page's filter finds them. ``stacked``: on a
+    phone each cell has a line of its own, behind the name of its column.
     Columns whose head ends in a bar hold words and are left-aligned; all others hold numbers.
     """
     words = [h.endswith("|") for h in head]
     kinds = ["" if w else ' class="n"' for w in words]
-    out = [f'<div class="scroll"><table><caption>{caption}</caption><thead><tr>']
+    heads = [f' data-head="{h.rstrip("|")}"' if stacked and h.rstrip("|") else "" for h in head]
+    kind = ' class="stack"' if stacked else ""
+    out = [f'<div class="scroll"><table{kind}><caption>{caption}</caption><thead><tr>']
     out += [f'<th scope="col"{k}>{h.rstrip("|")}</th>' for h, k in zip(head, kinds, strict=True)]
     out.append("</tr></thead><tbody>")
     for i, row in enumerate(rows):
         mark = f' class="{marks[i]}"' if i < len(marks) and marks[i] else ""
         out.append(f'<tr{mark} data-vehicle="{numbers[i]}">' if numbers else f"<tr{mark}>")
-        for j, (cell, kind) in enumerate(zip(row, kinds, strict=True)):
-            out.append(f'<th scope="row"{kind}>{cell}</th>' if j == 0 else f"<td{kind}>{cell}</td>")
+        for j, (cell, kind, name) in enumerate(zip(row, kinds, heads, strict=True)):
+            out.append(f'<th scope="row"{kind}{name}>{cell}</th>' if j == 0 else f"<td{kind}{name}>{cell}</td>")
         out.append("</tr>")
     out.append("</tbody></table></div>")
     return "".join(out)

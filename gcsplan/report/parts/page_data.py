@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal, Protocol
 
+from gcsplan.check.difference import PlanDifference
 from gcsplan.check.returns.verdict import WayHome
 from gcsplan.check.returns.words import verdict_words
 from gcsplan.check.verdict import Verdict
@@ -23,6 +24,7 @@ from gcsplan.report.parts.html import esc
 from gcsplan.report.parts.track_samples import MOST_SAMPLES
 from gcsplan.units import METRIC, Units
 from gcsplan.vehicle import Vehicle
+from gcsplan.world.geodesy.daylight import Daylight
 from gcsplan.world.world import World
 
 
@@ -120,6 +122,7 @@ class Page:
     """Everything that one report shows. ``facts`` are names and values of what was requested, in the order shown.
 
     ``left_out`` are names of vehicles without a mission, and why. ``units`` are those of all numbers on the page.
+    ``daylight`` is that of the first start, None if it is not known when the mission is flown.
     """
 
     title: str
@@ -133,6 +136,8 @@ class Page:
     units: Units = METRIC
     rehearsed: Rehearsed | None = None
     left_out: tuple[tuple[str, str], ...] = ()
+    differences: tuple[PlanDifference, ...] = ()
+    daylight: Daylight | None = None
 
     @property
     def time_decimals(self) -> int:

@@ -167,7 +167,8 @@ def _stretches(subject: Subject, home: WayHome, wording: Wording) -> str:
     if not rows:
         return ""
     head = ("on the way to|", "|", "along the track", "why|", "in the way|", "safe from, above home")
-    return table(f"Where the return of {esc(subject.name)} hits something or breaks a limit", head, rows, marks=marks)
+    title = f"Where the return of {esc(subject.name)} hits something or breaks a limit"
+    return table(title, head, rows, marks=marks, stacked=True)
 
 
 def _battery(subject: Subject, home: WayHome) -> str:

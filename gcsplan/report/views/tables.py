@@ -10,6 +10,7 @@ import numpy as np
 from gcsplan.check.verdict import LegFigures, by_item
 from gcsplan.figures import floored
 from gcsplan.mavlink.mission.autopilots import profile_of
+from gcsplan.notes.note import Wording
 from gcsplan.report.parts.html import (
     THIN,
     at_least,
@@ -31,6 +32,8 @@ from gcsplan.report.views.profile import passed
 from gcsplan.units import KILOJOULE, Unit, Units, duration, in_units
 from gcsplan.world.terrain.model_words import what_is_not_in
 
+MOST_DIFFERENCES = 30
+"""Most vehicles that show what changed."""
 CLOSE = 0.02
 """Part of a limit's value: if less than this is left, the limit is called close."""
 
@@ -59,6 +62,21 @@ def vehicles_table(page: Page, verdicts: Sequence[str]) -> str:
     head = ("vehicle|", "verdict|", "path", "gap", "lowest AGL", "highest AGL", "nearest zone|", "steepest", "energy",
             "battery", "arrives", "way home|")  # fmt: skip
     return table("Key figures", head, rows, marks=marks, numbers=range(len(rows)))
+
+
+def differences_html(page: Page) -> str:
+    """What changed since earlier missions, for each vehicle; empty where there is none to compare with."""
+    parts = []
+    for d in page.differences[:MOST_DIFFERENCES]:
+        parts.append(f"<h3>{esc(d.name)}: {esc(d.headline.text(Wording(page.units)))}</h3>")
+        if not d.equal:
+            rows = [tuple(map(esc, row)) for row in d.rows(page.units)]
+            parts.append(table(f"Figures of {esc(d.name)}", ("|", "before", "now", "change"), rows))
+            listed = "".join(f"<li>{esc(note.text(Wording(page.units)))}</li>" for note in d.remarks())
+            parts.append(f"<ul>{listed}</ul>" if listed else "")
+    rest = len(page.differences) - MOST_DIFFERENCES
+    more = f'<p class="note">and {rest} more vehicles: <code>--json</code> has all</p>' if rest > 0 else ""
+    return f'<section id="difference"><h2>What changed</h2>{"".join(parts)}{more}</section>' if parts else ""
 
 
 def legs_table(subject: Subject, units: Units) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 import yaml
 
@@ -10,6 +12,7 @@ from gcsplan.app.output.files import summary_of
 from gcsplan.errors import InputError, NoMission
 from gcsplan.mission_file import load_mission
 from tests.app.fleet.test_pipeline import CROSSING, planned
+from tests.support.batches import mission
 from tests.support.noted import one
 from tests.support.paths import DATA
 
@@ -38,3 +41,25 @@ def test_the_energy_objective_spends_no_more_than_the_shortest_way() -> None:
     )
     assert energy.vehicles[0].verdict.path_energy_j <= length.vehicles[0].verdict.path_energy_j * 1.001
     assert summary_of(energy)["vehicles"][0]["lower_bound_m"] is None
+
+
+@pytest.mark.parametrize(
+    ("battery", "key"),
+    [({"battery_wh": 10}, "battery_wh"), ({"battery_mah": 500, "battery_v": 22.2}, "battery_mah"),
+     ({"battery_j": 9000}, "battery_j")],
+)  # fmt: skip
+def test_a_battery_is_refused_with_one_in_its_own_unit_that_would_do(battery: dict[str, float], key: str) -> None:
+    vehicle = yaml.safe_load(mission())["vehicles"][0]
+    energy = {"horizontal_j_per_m": 100, "vertical_j_per_m": 120, "reserve": 0.25}
+    with pytest.raises(NoMission, match="battery") as refused:
+        plan(mission(vehicles=[vehicle | {"energy": energy | battery}]))
+    found = re.search(rf"{key}: ([0-9.]+) would do", str(refused.value))
+    assert found is not None
+    assert refused.value.reason == "battery"
+    for part, passes in ((1.0, True), (0.98, False)):
+        enough = battery | {key: part * float(found[1])}
+        try:
+            plan(mission(vehicles=[vehicle | {"energy": energy | enough}]))
+            assert passes
+        except NoMission:
+            assert not passes

@@ -48,7 +48,7 @@ from gcsplan.world.geometry.zones import Circle, Level, Zone
 from gcsplan.world.world import World
 from tests.check.fixed_wing.test_arcs import bent
 from tests.support.effort import draws
-from tests.support.noted import codes
+from tests.support.noted import codes, one
 from tests.support.paths import MISSIONS
 from tests.support.wings import FLAT, GROUND_M, HOME_DEG, RADIUS_M, SPEED_M_S, at, mission, take_off, wing
 from tests.support.worlds import world
@@ -640,3 +640,21 @@ def test_that_margins_shut_the_way_between_a_wings_ends_is_no_proof(monkeypatch:
         wings.solution_between(v.brief, v.problem, v.request.vehicle, v.brief.world)
     assert caught.value.reason == "not_found"
     assert [p.checked for p in asked] == [None, v.problem.checked]
+
+
+def test_a_straight_climb_of_kilometres_offers_circles_which_climb_near_the_start() -> None:
+    vehicle = {
+        "name": "w1", "sysid": 1, "autopilot": "arduplane", "start": [47.0, 8.0], "goal": [47.0, 8.06],
+        "turn_radius_m": 80, "speed_m_s": [14, 20], "end": "loiter",
+    }  # fmt: skip
+    whole = {"version": 1, "terrain": {"flat_m": 100}, "limits": {"min_agl_m": 150, "max_climb_deg": 6}}
+    (straight,) = plan(load_mission(whole | {"vehicles": [vehicle]})).vehicles
+    (circles,) = plan(load_mission(whole | {"vehicles": [vehicle | {"climb_out": "circles"}]})).vehicles
+    offer, made = one("circles_instead", straight.notes), one("climb_out_in_circles", circles.notes)
+    assert one("climb_out", straight.notes).data["far_m"] > 1000.0  # type: ignore[operator]
+    assert {key: made.data[key] for key in ("far_m", "circle_m")} == {
+        key: offer.data[key] for key in ("far_m", "circle_m")
+    }
+    assert made.data["circled_m"] == offer.data["up_m"]
+    assert circles.verdict.safe is True
+    assert [n.code for n in circles.notes if n.code == "circles_instead"] == []

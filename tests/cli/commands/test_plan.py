@@ -10,6 +10,7 @@ import pytest
 
 from gcsplan.sim.vehicle.server import SimServer
 from gcsplan.vehicle import Autopilot
+from tests.support.batches import mission
 from tests.support.crossing import CROSSING, OUTPUTS, vehicle
 
 
@@ -83,3 +84,41 @@ def test_a_plan_says_which_outputs_of_the_earlier_one_are_gone(run: Any, tmp_pat
     assert "gone from" in err
     assert "report.html; --report writes one of this plan" in err
     assert "gone from" not in run("plan", str(CROSSING), "-o", str(out))[2]
+
+
+def test_a_plan_says_what_changed_since_the_last_one_and_since_the_mission_on_board(run: Any) -> None:
+    with SimServer([vehicle()], "udpin:127.0.0.1:0", speedup=10.0) as server:
+        assert "since" not in run("plan", CROSSING, "--upload", server.url_for_gcs)[1]
+        code, out, _ = run("plan", CROSSING, "--compare-to", server.url_for_gcs)
+        assert code == 0
+        assert "uav1: nothing changed since the last plan" in out
+        assert f"uav1: nothing changed since {server.url_for_gcs}" in out
+        _, out, _ = run("plan", CROSSING, "--min-agl", "75", "--compare-to", server.url_for_gcs, "--json")
+    last, board = json.loads(out)["differences"]
+    assert (last["equal"], board["equal"]) == (False, False)
+    assert last["after"]["min_agl_m"] > 75.0 > last["before"]["min_agl_m"]
+    assert last["earlier_breaks_data"][0]["code"]
+
+
+@pytest.mark.parametrize("where", ["sim", "uav9=udpout:127.0.0.1:1", "link"])
+def test_a_wrong_mission_to_compare_with_is_refused_before_planning(run: Any, tmp_path: Path, where: str) -> None:
+    assert run("plan", CROSSING, "--compare-to", where)[0] == 2
+    assert not (tmp_path / "crossing").exists()
+
+
+def test_the_best_way_home_is_applied_and_saved(run: Any, tmp_path: Path) -> None:
+    file = tmp_path / "field.yaml"
+    zone = {"name": "tower", "center": [47.0, 8.01], "radius_m": 60, "ceiling_agl_m": 45}
+    file.write_text("# mine\n" + mission(no_fly=[zone]))
+    assert "no safe return" in run("plan", file, "--way-home")[1]
+    code, out, err = run("plan", file, "--apply")
+    assert code == 0
+    assert "safe return from all of it" in out
+    assert "--apply: vehicles[0].rtl_rel_home_m is" in err
+    text = file.read_text()
+    assert text.startswith("# mine\n")
+    assert "rtl_rel_home_m" in text
+    assert run("plan", file, "--require-way-home")[0] == 0
+    before = file.read_bytes()
+    assert run("plan", file, "--apply")[0] == 0  # nothing is left to be improved
+    assert file.read_bytes() == before

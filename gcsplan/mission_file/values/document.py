@@ -1,0 +1,147 @@
+"""A changed document written into the YAML text that it was read from: only the changed values are touched.
+
+The places of values come from PyYAML's nodes. Comments, order, quotes and line ends of all else stay as they are, which
+no writer of whole documents keeps. Whoever calls reads the new text again, and compares: nothing here has to be right
+for every text, as long as a mistake is seen.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Mapping
+from typing import Any
+
+import yaml
+
+from gcsplan.mission_file.values.yaml import Loader, read_yaml
+
+RESERVED_WORDS = {"yes", "no", "on", "off", "true", "false", "null"}
+
+Splice = tuple[int, int, str]
+"""Begin and end in the text, and what stands there instead."""
+
+
+def flow(value: Any) -> str:
+    """A value of YAML on one line."""
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{key}: {flow(v)}" for key, v in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(flow, value))}]"
+    if isinstance(value, str):
+        return word(value)
+    if isinstance(value, float) and not math.isfinite(value):
+        return ".nan" if math.isnan(value) else f"{'-' if value < 0 else ''}.inf"
+    return "null" if value is None else str(value).lower() if isinstance(value, bool) else repr(value)
+
+
+def word(text: str) -> str:
+    """A text as a YAML value, in quotes unless it cannot be taken for anything else."""
+    plain = re.fullmatch(r"[A-Za-z/][A-Za-z0-9_./:-]*[A-Za-z0-9_]", text) and text.lower() not in RESERVED_WORDS
+    return text if plain else json.dumps(text, ensure_ascii=False)
+
+
+def with_document(text: str, new: Mapping[str, Any]) -> str | None:
+    """``text`` with the values of ``new`` where they differ from its own; None where one has no place of its own."""
+    root = yaml.compose(text, Loader=Loader)
+    writing = _Writing(text)
+    if not isinstance(root, yaml.MappingNode) or not writing.mapping(root, read_yaml(text, where=""), new):
+        return None
+    # From the end to the beginning; of two at one place the inner one, which is found first, comes to stand first.
+    later_first = writing.spans[::-1]
+    for begin, end, put in sorted(later_first, key=lambda span: span[:2], reverse=True):
+        text = text[:begin] + put + text[end:]
+    return text
+
+
+class _Writing:
+    """The spans of a text that change. Each method is False where a change has no place."""
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+        self.spans: list[Splice] = []
+        self.line_end = "\r\n" if "\r\n" in text else "\n"
+
+    def mapping(self, node: yaml.MappingNode, old: Mapping[str, Any], new: Mapping[str, Any]) -> bool:
+        own = {key.value: (key, value) for key, value in node.value}
+        gone = [key for key in own if key in old and key not in new]
+        more = [key for key in new if key not in own and (key not in old or old[key] != new[key])]
+        if any(key not in own for key in old if key not in new) or len(gone) > len(more):
+            return False  # a merged key cannot go
+        for was, key in zip(gone, more, strict=False):  # a key in another unit
+            name, value = own[was]
+            self.spans.append((name.start_mark.index, _end(value), f"{key}: {flow(new[key])}"))
+        for key, (name, value) in own.items():
+            if key in new and old.get(key) != new[key] and not self._value(name, value, old.get(key), new[key]):
+                return False
+        added = more[len(gone) :]
+        if not added:
+            return True
+        if node.flow_style:
+            self._into_flow(node, [f"{key}: {flow(new[key])}" for key in added], own)
+        else:
+            column = node.value[0][0].start_mark.column
+            self._below(node, [line for key in added for line in _lines(key, new[key], " " * column)])
+        return True
+
+    def _value(self, name: yaml.Node, node: yaml.Node, old: Any, new: Any) -> bool:
+        """The value of the key ``name`` changes from ``old`` to ``new``."""
+        if isinstance(node, yaml.MappingNode) and isinstance(old, dict) and isinstance(new, dict) and node.value:
+            return self.mapping(node, old, new)
+        if isinstance(node, yaml.SequenceNode) and isinstance(old, list) and isinstance(new, list) and old:
+            kept = len(new) >= len(old) and all(_alike(a, b) for a, b in zip(old, new, strict=False))
+            if kept:
+                return self._sequence(node, old, new)
+        if (isinstance(node, yaml.ScalarNode) and node.value) or getattr(node, "flow_style", False):
+            self.spans.append((node.start_mark.index, _end(node), flow(new)))
+            return True
+        colon = self.text.find(":", name.end_mark.index)
+        self.spans.append((colon + 1, max(colon + 1, _end(node)), f" {flow(new)}"))
+        return colon >= 0
+
+    def _sequence(self, node: yaml.SequenceNode, old: list[Any], new: list[Any]) -> bool:
+        for inner, was, now in zip(node.value, old, new, strict=False):
+            if was != now and not self.mapping(inner, was, now):
+                return False
+        added = new[len(old) :]
+        if added and node.flow_style:
+            self._into_flow(node, [flow(value) for value in added], node.value)
+        elif added:
+            self._below(node, [f"{' ' * node.start_mark.column}- {flow(value)}" for value in added])
+        return True
+
+    def _into_flow(self, node: yaml.CollectionNode, parts: list[str], own: Any) -> None:
+        """Behind the last member, or between the brackets of an empty collection."""
+        at = _end(node.value[-1]) if own else node.end_mark.index - 1
+        self.spans.append((at, at, (", " if own else "") + ", ".join(parts)))
+
+    def _below(self, node: yaml.CollectionNode, lines: list[str]) -> None:
+        """In lines of their own behind the line in which a block ends."""
+        end = _end(node)
+        if self.text[end - 1 : end] == "\n":  # behind a block of text
+            end -= 1
+        stop = self.text.find("\n", end)
+        stop = len(self.text) if stop < 0 else stop - self.text[:stop].endswith("\r")
+        self.spans.append((stop, stop, "".join(self.line_end + line for line in lines)))
+
+
+def _alike(old: Any, new: Any) -> bool:
+    """Whether an entry of a list stays, or is a mapping whose own keys change."""
+    return bool(old == new) or (isinstance(old, dict) and isinstance(new, dict))
+
+
+def _lines(key: str, value: Any, indent: str) -> list[str]:
+    """A key of a block with its value; a list of mappings has a line for each."""
+    if isinstance(value, list) and value and all(isinstance(v, Mapping) for v in value):
+        return [f"{indent}{key}:", *(f"{indent}  - {flow(v)}" for v in value)]
+    return [f"{indent}{key}: {flow(value)}"]
+
+
+def _end(node: Any) -> int:
+    """Where a value's own text ends: the mark of a block lies behind the comments that follow it."""
+    if isinstance(node, tuple):
+        return _end(node[1])
+    if isinstance(node, yaml.CollectionNode) and not node.flow_style and node.value:
+        return _end(node.value[-1])
+    return int(node.end_mark.index)
