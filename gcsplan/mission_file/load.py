@@ -120,7 +120,10 @@ def load_mission(
 
     ``source`` is one of: the path of a mission file (a ``str`` without a line break, or a path object), or
     ``sample:NAME`` for one that comes with gcsplan (``sample:jacksboro``); the YAML text of one (a ``str`` with a line
-    break); a mapping of the same keys, which may contain lists, tuples and numpy numbers.
+    break); a mapping of the same keys, which may contain lists, tuples and numpy numbers. In a mapping,
+    ``terrain["dem"]`` may be an array of heights with its ``transform`` and ``crs``, an open rasterio dataset or a
+    rioxarray DataArray, or a list of the last two, and ``no_fly`` may be or contain GeoJSON (as mappings, by
+    ``__geo_interface__``, or a GeoDataFrame); so may the ``file`` of one of its entries.
     With ``text``, that is the content, and ``source`` is the path that it would have (or None). Files that a mission
     names are found relative to its own path, or else to the current folder.
 
@@ -132,7 +135,7 @@ def load_mission(
 
     Returns a `MissionFile`: vehicles, zones and terrain in metres. Raises InputError with every problem that was found,
     each with its place (file and key, such as ``vehicles[1].speed_m_s``; a mission without a file is called
-    ``mission``), and TypeError if ``source`` is none of these.
+    ``mission``), and UsageError if ``source`` is none of these.
 
     Examples:
         >>> mission = load_mission({
@@ -145,7 +148,7 @@ def load_mission(
         >>> [request.vehicle.name for request in mission.vehicles]
         ['uav1']
     """
-    file, where, raw, written = read_content(source, text)
+    file, where, raw, written, held = read_content(source, text)
     if "version" in raw and (raw["version"] != 1 or isinstance(raw["version"], bool | float)):
         words = f"this gcsplan reads version 1, given {shown(raw['version'])}; write `version: 1`, or update gcsplan"
         raise InputError(words, where=f"{where}: version")
@@ -153,7 +156,19 @@ def load_mission(
     keys = [MissionChange("", "terrain", key, value) for key, value in (terrain or {}).items()]
     made = changed(raw, [*keys, *changes], file.parent)
     return load_content(
-        Content(file, where, made.raw, written, names, tuple(around), departure, texts_of(at), made.options, made.notes)
+        Content(
+            file,
+            where,
+            made.raw,
+            written,
+            names,
+            tuple(around),
+            departure,
+            texts_of(at),
+            made.options,
+            made.notes,
+            held,
+        )
     )
 
 
@@ -162,9 +177,14 @@ def load_content(content: Content) -> MissionFile:
     return _MissionReading(content).mission()
 
 
+def _reaching(content: Content, places: Sequence[tuple[float, float]]) -> MissionFile:
+    """See `MissionFile.reaching`."""
+    return load_content(replace(content, around=tuple(places)))
+
+
 def read_no_fly(source: str | os.PathLike[str], at: Sequence[str] | None = None) -> tuple[list[ZoneDraft], list[Note]]:
     """All zones of a mission file, used or not, and the notes on them, whatever else is wrong. Raises InputError."""
-    file, where, raw, written = read_content(source, None)
+    file, where, raw, written, _ = read_content(source, None)
     return _MissionReading(Content(file, where, raw, written, at=texts_of(at))).zones_alone()
 
 
@@ -205,7 +225,7 @@ class _MissionReading:
         published, inside = self._zones(hours)
         drafts = used(published)
 
-        spec = None if terrain_keys is None else make_spec(terrain_keys, self.file.parent)
+        spec = None if terrain_keys is None else make_spec(terrain_keys, self.file.parent, self.content.held)
         terrain = None if spec is None else self._open(spec)
         places = [p for s in terminals for p in s.all]
         if terrain is not None:
@@ -241,7 +261,7 @@ class _MissionReading:
             altitude_frame=altitude_frame, terrain_error_m=terrain_error_m, local=self.local, inputs=inputs,
             notes=tuple(dict.fromkeys(self.notes)), way_home=way_home, geoid=site.terrain.geoid,
             hours=hours if left_out_by_hours(published) else None,
-            reaching=self._reaching, content=self.content,
+            reaching=partial(_reaching, self.content), content=self.content,
         )  # fmt: skip
         return replace(source, wider=partial(site.wider, source), at_level=partial(site.at_level, source))
 
@@ -254,9 +274,6 @@ class _MissionReading:
         if self.problems:
             raise self._refusal(self.problems)
         return [*published, *inside], list(dict.fromkeys(self.notes))
-
-    def _reaching(self, places: Sequence[tuple[float, float]]) -> MissionFile:
-        return load_content(replace(self.content, around=tuple(places)))
 
     def _refusal(self, problems: list[Mistake]) -> InputError:
         """All problems as the user wrote the keys, with their lines if the mission was a text."""
@@ -403,7 +420,7 @@ class _MissionReading:
                     self.problems.append(Mistake(f"{at}.name", words))
                 found = make_zones(
                     keys, at, self.file.parent, entry, self.problems, self.notes, local=self.local, hours=hours,
-                    keep_in=key == "keep_in",
+                    keep_in=key == "keep_in", held=self.content.held,
                 )  # fmt: skip
                 drafts += as_keep_in(found, at, self.problems) if key == "keep_in" else found
         return apart(uniquely_named(drafts), self.problems)

@@ -47,12 +47,13 @@ def read_zones(
     layer: str | None = None,
     policy: Policy | None = None,
     keep_in: bool = False,
+    data: bytes | None = None,
 ) -> ZoneFile:
     """The zones of a file in any of the formats; with ``keep_in`` they become areas to stay in, without their holes.
 
     ``where`` is the key that the zones belong to, ``radius_m`` the radius of points and ``buffer_m`` the half-width
     around lines that have none of their own, ``layer`` the only layer to read, and ``policy`` says which published
-    zones are no-fly.
+    zones are no-fly. ``data``: the content of a file that lies on no disk; ``path`` is then its name in messages.
 
     Mistakes in single features are collected in ``problems``; a file that cannot be read at all raises InputError.
     """
@@ -63,7 +64,7 @@ def read_zones(
     if layer is not None and kind not in VECTOR_ZONES:
         raise InputError(f"a {kind} file has no layers; leave `layer` out", where=where)
     policy = policy or Policy()
-    data = _bytes(path, where)
+    data = _bytes(path, where) if data is None else _few(path, len(data), data, where)
     whole = load_json(path, data) if kind in (*JSON_ZONES, PLAN) else None
     require_wgs84(whole, path, json_format(whole)[0])
     in_part = sent_in_part(whole, path)
@@ -110,14 +111,18 @@ def _bytes(path: Path, where: str) -> bytes:
     try:
         if not path.is_file():
             raise InputError(absent(path), where=where)
-        size = path.stat().st_size
-        if size > MAX_ZONE_BYTES:
-            raise InputError(f"{path} has {size} bytes, more than {MAX_ZONE_BYTES}; simplify or split it", where=where)
-        return path.read_bytes()
+        return _few(path, path.stat().st_size, None, where)
     except (OSError, ValueError) as why:
         if isinstance(why, InputError):
             raise
         raise InputError(f"{path} cannot be read: {why}", where=where) from None
+
+
+def _few(path: Path, size: int, data: bytes | None, where: str) -> bytes:
+    """``data``, or the bytes of the file; InputError for more than `MAX_ZONE_BYTES`."""
+    if size > MAX_ZONE_BYTES:
+        raise InputError(f"{path} has {size} bytes, more than {MAX_ZONE_BYTES}; simplify or split it", where=where)
+    return path.read_bytes() if data is None else data
 
 
 _JSON_FORMATS = (

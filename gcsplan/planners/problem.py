@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from itertools import pairwise
 from types import MappingProxyType
 from typing import Literal
@@ -100,6 +100,14 @@ class Problem:
     leaving: float = math.inf
     checked: Limits | None = None
     rounding_m: tuple[float, float] = (0.0, 0.0)
+
+    def __repr__(self) -> str:
+        return f"<Problem from {self.start} to {self.goal}, {len(self.via)} vias, {len(self.airspace.zones)} zones>"
+
+    def __getstate__(self) -> list[object]:
+        """Without the caller's function and without what loads more terrain, which are of this process alone."""
+        alone = {"progress": None, "widen": None, "options": dict(self.options)}
+        return [alone.get(f.name, getattr(self, f.name)) for f in fields(self)]
 
     @property
     def bound_limits(self) -> Limits:
@@ -223,6 +231,9 @@ class Solution:
     repaired: bool | None = None
     search: tuple[Step, ...] = ()
     problem: Problem | None = None
+
+    def __repr__(self) -> str:
+        return f"<Solution: {len(self.path.points)} points, bound {self.lower_bound}, stopped by {self.stopped_by}>"
 
 
 PlanFunction = Callable[[Problem], Solution]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
@@ -22,7 +23,7 @@ from gcsplan.export.geojson import write_geojson
 from gcsplan.export.kml import write_kml
 from gcsplan.export.profile import write_profile
 from gcsplan.export.rows import FlownTrack, ItemRow, WayPoint
-from gcsplan.export.summary import write_summary
+from gcsplan.export.summary import document, write_summary
 from gcsplan.figures import floored, raised
 from gcsplan.fleet.arrival import Slot
 from gcsplan.mavlink.files.formats import write_plan, write_waypoints
@@ -53,8 +54,7 @@ def outputs_of(
     ``homes``: vehicle name to its way home if that was judged; the summary then contains it. ``fences``: vehicle name
     to its fence items, for the `.plan`. With ``rally``, the `.plan` also contains the proposed rally points.
     """
-    slots = {s.name: s for s in plan.fleet.slots} if plan.fleet is not None else {}
-    tracks = [_track(v, plan.source.geoid, slots.get(v.name), homes.get(v.name)) for v in plan.vehicles]
+    slots, tracks = _slots(plan), _tracks(plan, homes)
     frame, zones = plan.world.frame, plan.world.airspace.zones
     files = {}
     for v in plan.vehicles:
@@ -75,6 +75,35 @@ def outputs_of(
     )
     files["summary.json"] = write_summary(summary_of(plan, homes=homes))
     return files
+
+
+def _slots(plan: Plan) -> dict[str, Slot]:
+    return {s.name: s for s in plan.fleet.slots} if plan.fleet is not None else {}
+
+
+def _tracks(plan: Plan, homes: Homes) -> list[FlownTrack]:
+    slots = _slots(plan)
+    return [_track(v, plan.source.geoid, slots.get(v.name), homes.get(v.name)) for v in plan.vehicles]
+
+
+def document_of(plan: Plan) -> dict[str, Any]:
+    """The document of ``plan --json`` as plain values."""
+    return document(summary_of(plan), clocks=True)
+
+
+def geojson_of(plan: Plan) -> dict[str, Any]:
+    """``mission.geojson`` as plain values."""
+    zones, frame = plan.world.airspace.zones, plan.world.frame
+    whole: dict[str, Any] = json.loads(write_geojson(plan.source.name, _tracks(plan, {}), zones, frame))
+    return whole
+
+
+def sketch_of(plan: Plan) -> str:
+    """Map and table as a fragment of HTML without scripts and styles."""
+    from gcsplan.app.output.report import page_of_plan
+    from gcsplan.report.views.sketch import sketch_html
+
+    return sketch_html(page_of_plan(plan), [str(verdict_words(v.verdict.safe, None)) for v in plan.vehicles])
 
 
 def _rally_items(home: WayHome) -> tuple[MissionItem, ...]:
