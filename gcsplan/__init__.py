@@ -23,9 +23,10 @@ if TYPE_CHECKING:
     from gcsplan.app.api import check, clear, download, fetch_dem, new, rehearse, report, upload, verify, write
     from gcsplan.app.fleet.pipeline import load_mission, plan
     from gcsplan.app.plan.model import FleetPlan, Plan, VehiclePlan
+    from gcsplan.app.session import BetterPath, Planner
     from gcsplan.app.upload.job import JobResult
     from gcsplan.check.verdict import LegFigures, Verdict
-    from gcsplan.errors import CheckFailed, GcsplanError, InputError, LinkError, NoMission, UsageError
+    from gcsplan.errors import Cancelled, CheckFailed, GcsplanError, InputError, LinkError, NoMission, UsageError
     from gcsplan.mavlink.mission.mission import Mission, MissionItem
     from gcsplan.mission_file.request import MissionFile
     from gcsplan.notes.note import Finding
@@ -43,7 +44,10 @@ _NAMES = {
     "gcsplan.app.plan.model": ("FleetPlan", "Plan", "VehiclePlan"),
     "gcsplan.app.upload.job": ("JobResult",),
     "gcsplan.check.verdict": ("LegFigures", "Verdict"),
-    "gcsplan.errors": ("CheckFailed", "GcsplanError", "InputError", "LinkError", "NoMission", "UsageError"),
+    "gcsplan.app.session": ("BetterPath", "Planner"),
+    "gcsplan.errors": (
+        "Cancelled", "CheckFailed", "GcsplanError", "InputError", "LinkError", "NoMission", "UsageError",
+    ),
     "gcsplan.mavlink.mission.mission": ("Mission", "MissionItem"),
     "gcsplan.mission_file.request": ("MissionFile",),
     "gcsplan.notes.note": ("Finding",),
@@ -55,10 +59,11 @@ _MODULE_OF = {name: module for module, names in _NAMES.items() for name in names
 """The module of each name, which is imported at its first use, so that the command line starts fast."""
 
 __all__ = [
-    "CheckFailed", "Finding", "FleetPlan", "GcsplanError", "InputError", "JobResult", "LegFigures", "LinkError",
-    "Mission", "MissionFile", "MissionItem", "NoMission", "Path", "Plan", "Problem", "Progress", "Refusal", "Rehearsal",
-    "Solution", "UsageError", "VehiclePlan", "Verdict", "Via", "__version__", "check", "clear", "download", "fetch_dem",
-    "load_mission", "new", "plan", "rehearse", "report", "upload", "verify", "write",
+    "BetterPath", "Cancelled", "CheckFailed", "Finding", "FleetPlan", "GcsplanError", "InputError", "JobResult",
+    "LegFigures", "LinkError", "Mission", "MissionFile", "MissionItem", "NoMission", "Path", "Plan", "Planner",
+    "Problem", "Progress", "Refusal", "Rehearsal", "Solution", "UsageError", "VehiclePlan", "Verdict", "Via",
+    "__version__", "check", "clear", "download", "fetch_dem", "load_mission", "new", "plan", "rehearse", "report",
+    "upload", "verify", "write",
 ]  # fmt: skip
 
 

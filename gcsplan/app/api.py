@@ -321,7 +321,7 @@ def download(
     """
     require("download", url=url, file=file, sysid=sysid, timeout_s=timeout_s)
     if file is None:
-        return uploads.on_board(url, sysid, f"vehicle {sysid}", timeout_s=timeout_s)
+        return uploads.mission_on_board(url, sysid, f"vehicle {sysid}", timeout_s=timeout_s)
     return uploads.download_to(url, sysid, Path(file), timeout_s=timeout_s)
 
 

@@ -13,9 +13,10 @@ from datetime import datetime
 from functools import partial
 from typing import Any, get_args
 
-from gcsplan.errors import InputError, Mistake
+from gcsplan.errors import InputError, Mistake, heed_cancel
 from gcsplan.mavlink.mission.mission import AltitudeFrame
 from gcsplan.mission_file.changes import MissionChange, changed
+from gcsplan.mission_file.kept import Kept, ReadZones
 from gcsplan.mission_file.published.times import Hours, hours_of, texts_of
 from gcsplan.mission_file.published.unused import (
     faults_near,
@@ -172,9 +173,10 @@ def load_mission(
     )
 
 
-def load_content(content: Content) -> MissionFile:
-    """Read a mission again from what it was read from before. Raises InputError."""
-    return _MissionReading(content).mission()
+def load_content(content: Content, kept: Kept | None = None) -> MissionFile:
+    """Read a mission again from what it was read from before. ``kept``: what the reading before kept, and this one
+    keeps. Raises InputError."""
+    return _MissionReading(content, kept or Kept()).mission()
 
 
 def _reaching(content: Content, places: Sequence[tuple[float, float]]) -> MissionFile:
@@ -185,14 +187,16 @@ def _reaching(content: Content, places: Sequence[tuple[float, float]]) -> Missio
 def read_no_fly(source: str | os.PathLike[str], at: Sequence[str] | None = None) -> tuple[list[ZoneDraft], list[Note]]:
     """All zones of a mission file, used or not, and the notes on them, whatever else is wrong. Raises InputError."""
     file, where, raw, written, _ = read_content(source, None)
-    return _MissionReading(Content(file, where, raw, written, at=texts_of(at))).zones_alone()
+    return _MissionReading(Content(file, where, raw, written, at=texts_of(at)), Kept()).zones_alone()
 
 
 class _MissionReading:
     """One pass over one file: the steps in order, and the problems found so far."""
 
-    def __init__(self, content: Content) -> None:
+    def __init__(self, content: Content, kept: Kept) -> None:
         self.content, self.file, self.text = content, content.file, content.text
+        self.kept = kept
+        kept.begin()
         self.where = f"{content.where}: "
         self.units = in_own_units(content.given, self.where)
         self.raw = self.units.raw
@@ -247,7 +251,7 @@ class _MissionReading:
                 self.notes += not_understood_far(placed, far, box)
                 self.notes += unused_notes(published, frame, box)
                 areas = self._areas(inside, frame)
-                site = MissionPlane(here, frame, box, placed, areas, terminals, set(places), self.local)
+                site = MissionPlane(here, frame, box, placed, areas, terminals, set(places), self.local, self.kept)
                 ground = site.load(problems)
         if problems or frame is None or site is None or ground is None:
             raise self._refusal(problems)
@@ -411,6 +415,7 @@ class _MissionReading:
                 words = f"must be a list of {what}, given {shown(value)}{dash}{empty}"
                 self.problems.append(Mistake(self.where + key, words))
             for i, one in enumerate(self._list(key)):
+                heed_cancel()
                 at, entry = f"{self.where}{key}[{i}]", f"{key}[{i}]"
                 keys = read_section(ZoneKeys, one, at, self.problems)
                 if keys is None:
@@ -418,11 +423,12 @@ class _MissionReading:
                 if keys.name is not None and (first := inline.setdefault(keys.name, entry)) != entry:
                     words = f"{keys.name[:64]!r} is the name of {first} already; change one"
                     self.problems.append(Mistake(f"{at}.name", words))
-                found = make_zones(
-                    keys, at, self.file.parent, entry, self.problems, self.notes, local=self.local, hours=hours,
-                    keep_in=key == "keep_in", held=self.content.held,
-                )  # fmt: skip
-                drafts += as_keep_in(found, at, self.problems) if key == "keep_in" else found
+                made_of = (one, hours, self.local, self.content.held.get(keys.file or ""))
+                made = partial(self._entry, keys, at, entry, hours, keep_in=key == "keep_in")
+                found, notes, problems = self.kept.zones(at, made_of, made)
+                drafts += found
+                self.notes += notes
+                self.problems += problems
         return apart(uniquely_named(drafts), self.problems)
 
     def _areas(self, inside: Sequence[ZoneDraft], frame: Frame) -> tuple[KeepIn, ...]:
@@ -431,6 +437,16 @@ class _MissionReading:
         except InputError as why:
             self.problems += why.problems
             return ()
+
+    def _entry(self, keys: ZoneKeys, at: str, entry: str, hours: Hours | None, *, keep_in: bool) -> ReadZones:
+        """The zones of one entry of ``no_fly`` or ``keep_in``, notes on them and mistakes."""
+        notes: list[Note] = []
+        problems: list[Mistake] = []
+        found = make_zones(
+            keys, at, self.file.parent, entry, problems, notes, local=self.local, hours=hours, keep_in=keep_in,
+            held=self.content.held,
+        )  # fmt: skip
+        return as_keep_in(found, at, problems) if keep_in else found, notes, problems
 
     def _far(self, far: list[ZoneDraft], frame: Frame) -> None:
         """Report zones too far away to matter: a mistake in this file, but normal in a zone file of a whole country."""
@@ -455,7 +471,7 @@ class _MissionReading:
             )
             return None
         try:
-            return opened(spec, where=where)
+            return self.kept.terrain.get((spec, where), partial(opened, spec, where=where))
         except InputError as why:
             self.problems += why.problems
             return None

@@ -10,6 +10,7 @@ import json
 import math
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -78,7 +79,9 @@ def with_zones(zones: Any, where: str, held: dict[str, bytes]) -> Any:
         return entries
     out = []
     for i, entry in enumerate(entries):
-        at, name = f"{where}[{i}]", f"no_fly[{i}].geojson"
+        at = f"{where}[{i}]"
+        names = (f"no_fly[{i}]{f'.{k}' if k > 1 else ''}.geojson" for k in count(1))
+        name = next(name for name in names if name not in held)
         if _is_geojson(entry):
             held[name] = _made(at, _json, entry, at)
             entry = {"file": name}

@@ -75,12 +75,14 @@ UNNAMED = Path("mission.yaml")
 def read_content(
     source: str | os.PathLike[str] | Mapping[str, Any] | None,
     text: str | None,
+    held: dict[str, bytes] | None = None,
 ) -> tuple[Path, str, dict[str, Any], str | None, dict[str, bytes]]:
     """The file, its name in messages, the mapping of keys, its text if it has one, and files that lie on no disk.
 
+    ``held``: files that have names already.
     Raises InputError and UsageError as `load_mission`.
     """
-    held: dict[str, bytes] = {}
+    held = {} if held is None else held
     if isinstance(source, str) and ("\n" in source or "\r" in source):
         if text is not None:
             raise UsageError(

@@ -39,12 +39,17 @@ class Via:
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """A progress report of a plan: seconds since the call, best cost so far, lower bound (either may be None)."""
+    """A progress report of a plan: seconds since the call, best cost so far, lower bound (either may be None).
+
+    ``path``: the best path so far, if it is one from start to goal. Its legs keep the limits; the mission made of it is
+    not judged yet.
+    """
 
     elapsed_s: float
     cost: float | None
     lower_bound: float | None
     phase: str = ""
+    path: Path | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,6 +20,8 @@ EXPECTED: dict[str, tuple[Any, str]] = {
     "options": (Mapping, "a mapping of a planner's keys"),
     "gate_utc": (datetime, "a datetime"),
     "progress": (Callable, "a function"),
+    "on_path": (Callable, "a function"),
+    "on_bound": (Callable, "a function"),
     "jobs": (Integral, "a number of processes"),
     "leave_out": (bool, "True or False"),
     "planned": (Plan, "a plan, as gcsplan.plan returns it"),

@@ -497,13 +497,13 @@ def download_to(url: str, sysid: int, file: Path, *, timeout_s: float = 60.0) ->
         raise UsageError(f"-o {file}: give a name that ends in .waypoints or .plan")
     if file.is_dir() or not file.parent.is_dir():
         raise UsageError(f"-o {file}: give a file in a directory that exists")
-    mission = on_board(url, sysid, file.stem, timeout_s=timeout_s)
+    mission = mission_on_board(url, sysid, file.stem, timeout_s=timeout_s)
     text = write_plan(mission) if file.suffix.lower() == ".plan" else write_waypoints(mission)
     write_whole(file, text)
     return mission
 
 
-def on_board(url: str, sysid: int, name: str, *, timeout_s: float = 60.0) -> Mission:
+def mission_on_board(url: str, sysid: int, name: str, *, timeout_s: float = 60.0) -> Mission:
     """The mission on board, with ``name``; nothing is written to the vehicle."""
     from gcsplan.mavlink.link.session import session
 

@@ -67,6 +67,20 @@ def bench_upload(
     _tell(result, bench.report, as_json)
 
 
+@bench_app.command("session", short_help="A living session: first path, cancelling, memory.")
+def bench_session(
+    changes: Annotated[int, typer.Option(metavar="N", help="Changes of the goal, on each terrain.")] = 40,
+    cancels: Annotated[int, typer.Option(metavar="N", help="Plans that are cancelled at random moments.")] = 40,
+    memory: Annotated[int, typer.Option(metavar="N", help="Changes over which memory is measured [0: none].")] = 0,
+    seed: Annotated[int, typer.Option(metavar="N", help="Seed of missions and moments.")] = 1,
+    as_json: JsonOption = False,
+) -> None:
+    """Measure a session of Python on the sample terrain with 40 zones and on a tile of one degree with 30 m posts."""
+    from gcsplan.bench import session as bench
+
+    _tell(bench.run(changes, cancels, memory, seed), bench.report, as_json)
+
+
 @bench_app.command("fleet", short_help="A large fleet, from mission file to upload.")
 def bench_fleet(
     vehicles: Annotated[int, typer.Option(metavar="N", help="Vehicles, 2 to 2000.")] = 1000,
