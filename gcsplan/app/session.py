@@ -26,7 +26,7 @@ from gcsplan.app.plan.model import Plan
 from gcsplan.arrays import Floats
 from gcsplan.errors import InputError, UsageError, cancelled_by, heed_cancel, unknown_name
 from gcsplan.mission_file import load_mission
-from gcsplan.mission_file.kept import Kept
+from gcsplan.mission_file.kept import KeptWorld
 from gcsplan.mission_file.load import load_content
 from gcsplan.mission_file.request import Content, MissionFile
 from gcsplan.mission_file.source import read_content
@@ -34,7 +34,7 @@ from gcsplan.planners.problem import Progress
 
 __all__ = ["BetterPath", "Planner"]
 
-Source = MissionFile | str | Mapping[str, Any]
+MissionSource = MissionFile | str | Mapping[str, Any]
 
 _STEP = re.compile(r"\.?([^.\[\]]+)|\[(\d+)\]")
 """A step of a key's place: a name, or the number of an element."""
@@ -96,7 +96,7 @@ class Planner:
 
     def __init__(
         self,
-        mission: Source,
+        mission: MissionSource,
         *,
         planner: str | None = None,
         objective: str | None = None,
@@ -115,7 +115,7 @@ class Planner:
             )
         # Lines of a text would be those before its changes.
         self._content: Content = replace(source.content, text=None)
-        self._kept = Kept()
+        self._kept = KeptWorld()
         self._planning, self._state = threading.RLock(), threading.Lock()
         self._cancels = 0
 
@@ -198,7 +198,7 @@ class Planner:
     def reload(self) -> None:
         """Forget what is kept of files, so that the next plan reads them as they are then."""
         with self._planning:
-            self._kept = Kept()
+            self._kept = KeptWorld()
 
 
 class _Listening:

@@ -17,7 +17,7 @@ from gcsplan.bench.sample import SAMPLE_HALF_M, SAMPLE_MIDDLE_DEG, SAMPLE_TERRAI
 from gcsplan.errors import Cancelled, GcsplanError
 from gcsplan.world.geodesy.frame import Frame
 
-ZONES = 40
+SESSION_ZONES = 40
 DEGREE_POSTS = 3601
 """Rows and columns of a tile of one degree with posts every 30 m."""
 LEGS_M = (3_000.0, 9_000.0)
@@ -31,7 +31,7 @@ def run(changes: int = 40, cancels: int = 40, memory_changes: int = 0, seed: int
     moments of a plan, and the memory that ``memory_changes`` take (0: not measured)."""
     rng = np.random.default_rng(seed)
     sample = _mission(SAMPLE_TERRAIN, SAMPLE_MIDDLE_DEG, SAMPLE_HALF_M, rng)
-    result: dict[str, Any] = {"changes": changes, "zones": ZONES, "seed": seed}
+    result: dict[str, Any] = {"changes": changes, "zones": SESSION_ZONES, "seed": seed}
     result["sample"] = _first_paths(sample, SAMPLE_MIDDLE_DEG, changes, rng)
     middle = (46.5, 8.5)
     degree = _mission(_degree(rng), middle, (20_000.0, 20_000.0), rng)
@@ -83,7 +83,7 @@ def _mission(
                "goal": _goal(middle, rng)}  # fmt: skip
     zones = [
         {"name": f"zone{k}", "center": _place(middle, half_m, rng), "radius_m": round(float(rng.uniform(80, 500)), 1)}
-        for k in range(ZONES)
+        for k in range(SESSION_ZONES)
     ]
     near = Frame(*middle)
     zones = [z for z in zones if np.hypot(*near.to_plane(*z["center"])) > z["radius_m"] + 150.0]  # type: ignore[misc,operator]

@@ -45,7 +45,7 @@ class Latest(Generic[T]):
 
 
 @dataclass(eq=False)
-class Kept:
+class KeptWorld:
     """The memory of one session; for one thread at a time."""
 
     terrain: Latest[OpenTerrain] = field(default_factory=lambda: Latest(1))

@@ -16,7 +16,7 @@ from typing import Any, get_args
 from gcsplan.errors import InputError, Mistake, heed_cancel
 from gcsplan.mavlink.mission.mission import AltitudeFrame
 from gcsplan.mission_file.changes import MissionChange, changed
-from gcsplan.mission_file.kept import Kept, ReadZones
+from gcsplan.mission_file.kept import KeptWorld, ReadZones
 from gcsplan.mission_file.published.times import Hours, hours_of, texts_of
 from gcsplan.mission_file.published.unused import (
     faults_near,
@@ -173,10 +173,10 @@ def load_mission(
     )
 
 
-def load_content(content: Content, kept: Kept | None = None) -> MissionFile:
+def load_content(content: Content, kept: KeptWorld | None = None) -> MissionFile:
     """Read a mission again from what it was read from before. ``kept``: what the reading before kept, and this one
     keeps. Raises InputError."""
-    return _MissionReading(content, kept or Kept()).mission()
+    return _MissionReading(content, kept or KeptWorld()).mission()
 
 
 def _reaching(content: Content, places: Sequence[tuple[float, float]]) -> MissionFile:
@@ -187,13 +187,13 @@ def _reaching(content: Content, places: Sequence[tuple[float, float]]) -> Missio
 def read_no_fly(source: str | os.PathLike[str], at: Sequence[str] | None = None) -> tuple[list[ZoneDraft], list[Note]]:
     """All zones of a mission file, used or not, and the notes on them, whatever else is wrong. Raises InputError."""
     file, where, raw, written, _ = read_content(source, None)
-    return _MissionReading(Content(file, where, raw, written, at=texts_of(at)), Kept()).zones_alone()
+    return _MissionReading(Content(file, where, raw, written, at=texts_of(at)), KeptWorld()).zones_alone()
 
 
 class _MissionReading:
     """One pass over one file: the steps in order, and the problems found so far."""
 
-    def __init__(self, content: Content, kept: Kept) -> None:
+    def __init__(self, content: Content, kept: KeptWorld) -> None:
         self.content, self.file, self.text = content, content.file, content.text
         self.kept = kept
         kept.begin()

@@ -15,7 +15,7 @@ from weakref import WeakValueDictionary
 import numpy as np
 
 from gcsplan.errors import InputError, Mistake, heed_cancel
-from gcsplan.mission_file.kept import Kept
+from gcsplan.mission_file.kept import KeptWorld
 from gcsplan.mission_file.request import MissionFile, VehicleRequest
 from gcsplan.mission_file.scene import LOCAL_MARGIN_M, MARGIN_M, MissionPlace, settle_areas, settle_zones
 from gcsplan.mission_file.terminals import Terminals, make_request
@@ -75,7 +75,7 @@ class MissionPlane:
     terminals: Sequence[Terminals]
     good: Collection[MissionPlace]
     local: bool
-    kept: Kept = field(default_factory=Kept)
+    kept: KeptWorld = field(default_factory=KeptWorld)
     _extent: Box | None = None
     _loaded: WeakValueDictionary[int, MissionFile] = field(default_factory=WeakValueDictionary)
 

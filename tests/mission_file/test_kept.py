@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from gcsplan.errors import Mistake
-from gcsplan.mission_file.kept import Kept, Latest
+from gcsplan.mission_file.kept import KeptWorld, Latest
 
 
 def test_the_latest_values_are_made_once_and_the_oldest_is_forgotten() -> None:
@@ -19,7 +19,7 @@ def test_the_latest_values_are_made_once_and_the_oldest_is_forgotten() -> None:
 
 
 def test_zones_are_read_again_when_their_entry_changes_or_has_a_mistake() -> None:
-    kept, read = Kept(), []
+    kept, read = KeptWorld(), []
 
     def zones(key: str, wrong: bool = False) -> None:
         kept.begin()
