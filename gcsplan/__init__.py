@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from gcsplan.mission_file.request import MissionFile
     from gcsplan.notes.note import Finding
     from gcsplan.planners.problem import Problem, Progress, Refusal, Solution, Via
+    from gcsplan.plugins import register_optimiser, register_output, register_planner, register_zone_reader
     from gcsplan.sim.outcome import Rehearsal
     from gcsplan.world.geometry.path import Path
 
@@ -52,6 +53,9 @@ _NAMES = {
     "gcsplan.mission_file.request": ("MissionFile",),
     "gcsplan.notes.note": ("Finding",),
     "gcsplan.planners.problem": ("Problem", "Progress", "Refusal", "Solution", "Via"),
+    "gcsplan.plugins": (
+        "register_optimiser", "register_output", "register_planner", "register_zone_reader",
+    ),
     "gcsplan.sim.outcome": ("Rehearsal",),
     "gcsplan.world.geometry.path": ("Path",),
 }  # fmt: skip
@@ -62,8 +66,8 @@ __all__ = [
     "BetterPath", "Cancelled", "CheckFailed", "Finding", "FleetPlan", "GcsplanError", "InputError", "JobResult",
     "LegFigures", "LinkError", "Mission", "MissionFile", "MissionItem", "NoMission", "Path", "Plan", "Planner",
     "Problem", "Progress", "Refusal", "Rehearsal", "Solution", "UsageError", "VehiclePlan", "Verdict", "Via",
-    "__version__", "check", "clear", "download", "fetch_dem", "load_mission", "new", "plan", "rehearse", "report",
-    "upload", "verify", "write",
+    "__version__", "check", "clear", "download", "fetch_dem", "load_mission", "new", "plan", "register_optimiser",
+    "register_output", "register_planner", "register_zone_reader", "rehearse", "report", "upload", "verify", "write",
 ]  # fmt: skip
 
 

@@ -23,7 +23,7 @@ DEGREE_POSTS = 3601
 LEGS_M = (3_000.0, 9_000.0)
 """Lengths between which missions are drawn, m."""
 MEMORY_PLANS = 20
-"""Of the changes of the memory's measurement, one in this many is planned."""
+"""One in this many changes is planned while memory is measured."""
 
 
 def run(changes: int = 40, cancels: int = 40, memory_changes: int = 0, seed: int = 1) -> dict[str, Any]:
@@ -140,10 +140,10 @@ def _cancels(mission: dict[str, Any], count: int, rng: np.random.Generator) -> d
         thread = threading.Thread(target=work)
         thread.start()
         time.sleep(float(rng.uniform(0.0, 0.8 * long_s)))
-        asked_s = time.perf_counter()
+        begun_s = time.perf_counter()
         session.cancel()
         thread.join()
-        took += [at - asked_s for at in ended]
+        took += [at - begun_s for at in ended]
     return {"count": len(took), "p50_s": float(np.median(took)), "max_s": max(took)}
 
 

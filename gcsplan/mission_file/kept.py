@@ -18,7 +18,7 @@ from gcsplan.world.geometry.surface import Surface
 from gcsplan.world.terrain.terrain import OpenTerrain
 
 MOST_SURFACES = 4
-"""Most windows of terrain: those of one plan, which widens them."""
+"""Most windows of terrain that are kept: one plan widens its window a few times."""
 
 T = TypeVar("T")
 
@@ -58,7 +58,7 @@ class KeptWorld:
         self._before, self._now = self._now or self._before, {}
 
     def zones(self, where: str, key: Any, make: Callable[[], ReadZones]) -> ReadZones:
-        """The zones of the entry ``where``; those with mistakes are read again the next time."""
+        """The zones of the entry ``where``; an entry with mistakes is read again the next time."""
         known = self._before.get(where)
         found = known[1] if known is not None and known[0] == key else make()
         if not found[2]:

@@ -342,9 +342,9 @@ class _MissionReading:
         keys: PlannerKeys = self._section(PlannerKeys, "planner") or PlannerKeys()
         known = self.content.planner_names
         if known is None:
-            from gcsplan.planners.registry import names
+            from gcsplan.planners.registry import PLANNER_PACKAGES, names
 
-            known = names()
+            known = tuple(PLANNER_PACKAGES) if keys.name in PLANNER_PACKAGES else names()
         if keys.name not in known:
             near = nearest(keys.name, known) or f"; known are {', '.join(known)}"
             self.problems.append(Mistake(f"{self.where}planner.name", f"no planner is named {keys.name[:64]!r}{near}"))

@@ -5,6 +5,7 @@ Published formats are known likewise: OpenAir by its name, the others by members
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,7 @@ from gcsplan.mission_file.zones.file import OnBad, ZoneFile
 from gcsplan.mission_file.zones.geojson import read_geojson
 from gcsplan.mission_file.zones.kml import read_kml
 from gcsplan.mission_file.zones.plan_fence import read_plan_fence
+from gcsplan.plugins import ZONE_READERS, failing
 from gcsplan.world.terrain.input_files import (
     FENCE_ZONES,
     JSON_ZONES,
@@ -58,13 +60,17 @@ def read_zones(
     Mistakes in single features are collected in ``problems``; a file that cannot be read at all raises InputError.
     """
     kind = path.suffix.lower()
-    if kind not in (*ZONE_FILES, *FENCE_ZONES, PLAN, *OPENAIR_ZONES):
+    own = (*ZONE_FILES, *FENCE_ZONES, PLAN, *OPENAIR_ZONES)
+    added = None if kind in own else ZONE_READERS.get(kind)
+    if added is None and kind not in own:
         known = f"{', '.join((*ZONE_FILES, *FENCE_ZONES, PLAN))} and OpenAir ({', '.join(OPENAIR_ZONES)}) files"
         raise InputError(f"zones are read from {known}, given {path.name}", where=where)
     if layer is not None and kind not in VECTOR_ZONES:
         raise InputError(f"a {kind} file has no layers; leave `layer` out", where=where)
     policy = policy or Policy()
     data = _bytes(path, where) if data is None else _few(path, len(data), data, where)
+    if added is not None:  # what it makes is read as a file of GeoJSON
+        kind, data = JSON_ZONES[0], geojson_by(added, path, data)
     whole = load_json(path, data) if kind in (*JSON_ZONES, PLAN) else None
     require_wgs84(whole, path, json_format(whole)[0])
     in_part = sent_in_part(whole, path)
@@ -88,6 +94,12 @@ def read_zones(
     found.settle(on_bad, f"leave it out by name ({skipped})")
     found.holes = 0 if keep_in else found.holes
     return found
+
+
+def geojson_by(read: Callable[[bytes], Any], path: Path, data: bytes) -> bytes:
+    """The GeoJSON that the reader of another package makes of a file. Raises InputError."""
+    with failing(f"{path}: its reader"):
+        return json.dumps(read(data)).encode()
 
 
 def _read(path: Path, kind: str, data: bytes, layer: str | None, whole: Any) -> ZoneFile:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import math
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from types import MappingProxyType
@@ -19,8 +20,10 @@ from gcsplan.app.upload.on_board import settings_of_plan
 from gcsplan.arrays import Floats
 from gcsplan.check.returns.words import verdict_words
 from gcsplan.check.verdict import LegFigures, Verdict
+from gcsplan.errors import InputError
 from gcsplan.export.geojson import write_geojson
 from gcsplan.export.kml import write_kml
+from gcsplan.export.outdir import is_output
 from gcsplan.export.profile import write_profile
 from gcsplan.export.rows import FlownTrack, ItemRow, WayPoint
 from gcsplan.export.summary import document, write_summary
@@ -31,6 +34,7 @@ from gcsplan.mavlink.mission.commands import command_name
 from gcsplan.mavlink.mission.mission import MissionItem
 from gcsplan.mavlink.mission.parameter_file import PARAM_ENDING, param_file
 from gcsplan.notes.note import in_json
+from gcsplan.plugins import OUTPUTS, failing
 from gcsplan.units import METRIC, Units
 
 if TYPE_CHECKING:
@@ -74,6 +78,29 @@ def outputs_of(
         [row for v in plan.vehicles for row in item_rows(v.name, v.verdict, slots.get(v.name))]
     )
     files["summary.json"] = write_summary(summary_of(plan, homes=homes))
+    return files | _added(plan, files)
+
+
+def _added(plan: Plan, own: Mapping[str, str]) -> dict[str, str]:
+    """The files of other packages. Raises InputError for one that cannot stand beside gcsplan's ``own``."""
+    files: dict[str, str] = {}
+    for name in OUTPUTS.names():
+        where, write = f"output {name}", OUTPUTS.get(name)
+        assert write is not None
+        with failing(where):
+            found = dict(write(plan))
+        for file, text in found.items():
+            if not isinstance(file, str) or not isinstance(text, str):
+                raise InputError("an output is a mapping from file names to texts", where=where)
+            if (
+                file != os.path.basename(file)
+                or file.startswith(".")
+                or is_output(file)
+                or file in own
+                or file in files
+            ):
+                raise InputError(f"{file[:80]!r} is no free name for a file of its own in the folder", where=where)
+            files[file] = text
     return files
 
 

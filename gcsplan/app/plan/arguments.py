@@ -14,7 +14,7 @@ from gcsplan.errors import UsageError
 __all__ = ["require"]
 
 EXPECTED: dict[str, tuple[Any, str]] = {
-    "planner": (str, "the name of a planner (`gcsplan planners` lists them; docs/extending.md says how to add one)"),
+    "planner": ((str, Callable), "the name of a planner (`gcsplan planners` lists them), or a function that plans"),
     "objective": (str, "'length' or 'energy'"),
     "seed": (Integral, "a whole number"),
     "options": (Mapping, "a mapping of a planner's keys"),

@@ -19,6 +19,7 @@ from gcsplan.mission_file import MissionFile, VehicleRequest
 from gcsplan.notes.note import Note
 from gcsplan.planners.problem import Problem, Solution
 from gcsplan.planners.registry import get as get_planner
+from gcsplan.planners.registry import own as own_planner
 from gcsplan.world.world import World
 
 if TYPE_CHECKING:
@@ -43,7 +44,7 @@ class PlanOptions:
     out.
     """
 
-    planner: str | None = None
+    planner: str | Callable[[Problem], Solution] | None = None
     objective: str | None = None
     seed: int | None = None
     options: Mapping[str, object] = field(default_factory=dict)
@@ -55,7 +56,8 @@ class PlanOptions:
 class Brief:
     """How all vehicles of a mission file are planned: by which planner, with ``options`` that only it knows.
 
-    ``by_priority``: each vehicle is planned with knowledge of those before it, and gives way to them.
+    ``by_priority``: each vehicle is planned with knowledge of those before it, and gives way to them. ``own``: the
+    planner, if it is a script's function.
     """
 
     source: MissionFile
@@ -65,6 +67,7 @@ class Brief:
     seed: int
     options: Mapping[str, object]
     by_priority: bool = False
+    own: Callable[[Problem], Solution] | None = None
 
     def __repr__(self) -> str:
         return f"<Brief: {self.planner}, {self.objective}, seed {self.seed}>"
@@ -72,7 +75,7 @@ class Brief:
     @property
     def run(self) -> Callable[[Problem], Solution]:
         """The planner."""
-        return get_planner(self.planner).plan
+        return get_planner(self.planner).plan if self.own is None else own_planner(self.own).plan
 
     def packed(self) -> Brief:
         """The brief without mission and world, for another process, which has read both: `over` puts them in again."""

@@ -76,8 +76,8 @@ class TerrainSpec:
     exact zeros are ground or sea.
     ``obstacle_height_m`` stands everywhere; ``canopy`` is a raster of heights above ground, whose nodata cells are
     unknown unless ``canopy_nodata_m`` sets their height; if both are set the higher one counts. ``sea``: where a
-    published source has no tile, or no tile of the user's own knows the ground, there is sea. ``held``: by their names in
-    ``dem``, GeoTIFFs that lie on no disk.
+    published source has no tile, or no tile of the user's own knows the ground, there is sea. ``held``: by
+    their names in ``dem``, GeoTIFFs that lie on no disk.
     """
 
     dem: tuple[str, ...] = ()
