@@ -100,7 +100,7 @@ PLANNER_PACKAGES: Mapping[str, str] = MappingProxyType(
 
 
 def names() -> tuple[str, ...]:
-    """Every planner's name, the default one first, those of other packages last."""
+    """Every planner's name, the default one first, planners of other packages last."""
     return (*PLANNER_PACKAGES, *(name for name in PLANNERS.names() if name not in PLANNER_PACKAGES))
 
 

@@ -22,6 +22,7 @@ from typer import testing as runner
 
 import gcsplan
 from gcsplan.app import api as scripting
+from gcsplan.app import session
 from gcsplan.app.api import rehearse, upload, write
 from gcsplan.app.fleet import pipeline
 from gcsplan.app.fleet.pipeline import plan
@@ -78,8 +79,8 @@ def run(code: str) -> str:
 
 
 NAMES = [
-    "check", "clear", "download", "fetch_dem", "load_mission", "new", "plan", "rehearse", "report", "upload", "verify",
-    "write",
+    "check", "clear", "download", "fetch_dem", "load_mission", "new", "plan", "register_optimiser", "register_output",
+    "register_planner", "register_zone_reader", "rehearse", "report", "upload", "verify", "write",
 ]  # fmt: skip
 
 
@@ -117,7 +118,7 @@ def test_check_and_report_are_functions_whatever_was_imported_before(first: str)
     assert run(code + "; print(check.__module__, gcsplan.report is report)") == "gcsplan.app.api True"
 
 
-@pytest.mark.parametrize("module", [load, pipeline, scripting], ids=lambda m: m.__name__)
+@pytest.mark.parametrize("module", [load, pipeline, scripting, session], ids=lambda m: m.__name__)
 def test_the_examples_in_the_docstrings_run(module: ModuleType) -> None:
     found = doctest.testmod(module)
     assert found.attempted > 1

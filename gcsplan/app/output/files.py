@@ -157,13 +157,13 @@ def figures_of(plan: Plan) -> dict[str, bytes]:
     return picture.figures(page_of_plan(plan))
 
 
-def picture_of(plan: Plan) -> bytes:
-    """Map and profiles in one PNG."""
+def picture_of(plan: Plan, form: str = "png") -> bytes:
+    """Map and profiles in one picture; ``form``: png, svg or pdf."""
     from gcsplan.app.output.report import page_of_plan
     from gcsplan.report.views import picture
 
     buffer = io.BytesIO()
-    picture.save(page_of_plan(plan), buffer)
+    picture.save(page_of_plan(plan), buffer, form)
     return buffer.getvalue()
 
 
