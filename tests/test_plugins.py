@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import re
 import subprocess
 import sys
@@ -92,6 +93,12 @@ def test_a_function_plans_and_its_claims_are_not_taken_over() -> None:
     assert one.solution.lower_bound is None
     assert one.solution.stopped_by == "exhausted"
     assert plan(FLAT, planner="tests.test_plugins:straight").vehicles[0].verdict.safe
+
+
+def test_a_plan_by_a_function_of_a_script_can_be_pickled() -> None:
+    planned = plan(FLAT, planner=lambda problem: straight(problem))
+    again = pickle.loads(pickle.dumps(planned))
+    assert gcsplan.check(again)["uav1"].safe
 
 
 def test_a_path_through_a_zone_is_refused_whoever_drew_it() -> None:

@@ -11,6 +11,7 @@ functions. A session only keeps what they would read again.
 from __future__ import annotations
 
 import copy
+import os
 import re
 import threading
 import time
@@ -30,11 +31,11 @@ from gcsplan.mission_file.kept import KeptWorld
 from gcsplan.mission_file.load import load_content
 from gcsplan.mission_file.request import Content, MissionFile
 from gcsplan.mission_file.source import read_content
-from gcsplan.planners.problem import Progress
+from gcsplan.planners.problem import Problem, Progress, Solution
 
 __all__ = ["BetterPath", "Planner"]
 
-MissionSource = MissionFile | str | Mapping[str, Any]
+MissionSource = MissionFile | str | os.PathLike[str] | Mapping[str, Any]
 
 _STEP = re.compile(r"\.?([^.\[\]]+)|\[(\d+)\]")
 """A step of a key's place: a name, or the number of an element."""
@@ -98,7 +99,7 @@ class Planner:
         self,
         mission: MissionSource,
         *,
-        planner: str | None = None,
+        planner: str | Callable[[Problem], Solution] | None = None,
         objective: str | None = None,
         seed: int | None = None,
         options: Mapping[str, object] | None = None,
@@ -155,15 +156,24 @@ class Planner:
 
         Returns what `gcsplan.plan` returns. Raises InputError, NoMission, and Cancelled after `cancel`.
         """
+        return self._planned(self._cancels, changes, on_path, on_bound, leave_out)
+
+    def _planned(
+        self,
+        cancels: int,
+        changes: Mapping[str, object] | None,
+        on_path: PathCall | None,
+        on_bound: BoundCall | None,
+        leave_out: bool | None,
+    ) -> Plan:
+        """See `plan`; a cancel after the first ``cancels`` ends it."""
         require("plan", on_path=on_path, on_bound=on_bound, leave_out=leave_out)
-        with self._state:
-            begun, content = self._cancels, self._content
-        if changes is not None:
-            content = _changed(content, changes)
-        with cancelled_by(lambda: self._cancels != begun), self._planning:
+        begun_s = time.perf_counter()
+        content = self._content if changes is None else _changed(self._content, changes)
+        with cancelled_by(lambda: self._cancels != cancels), self._planning:
             heed_cancel()
             source = load_content(content, self._kept)
-            heard = _Listening(source, on_path, on_bound) if on_path or on_bound else None
+            heard = _Listening(source, on_path, on_bound, begun_s) if on_path or on_bound else None
             return pipeline.plan(source, progress=heard, leave_out=leave_out, **self._options)
 
     async def plan_async(
@@ -178,11 +188,9 @@ class Planner:
         plan, and every other one of this session."""
         import asyncio
 
-        def run() -> Plan:
-            return self.plan(changes, on_path=on_path, on_bound=on_bound, leave_out=leave_out)
-
+        given = (self._cancels, changes, on_path, on_bound, leave_out)  # a cancel counts before the thread begins, too
         try:
-            return await asyncio.to_thread(run)
+            return await asyncio.to_thread(self._planned, *given)
         except asyncio.CancelledError:
             self.cancel()
             raise
@@ -205,9 +213,10 @@ class _Listening:
     """Turns a plan's progress into calls for better paths and bounds. A search that begins anew with larger margins
     has paths of its own, which count from the first again."""
 
-    def __init__(self, source: MissionFile, on_path: PathCall | None, on_bound: BoundCall | None) -> None:
-        self._frame, self._on_path, self._on_bound = source.frame, on_path, on_bound
-        self._begun_s = time.perf_counter()
+    def __init__(
+        self, source: MissionFile, on_path: PathCall | None, on_bound: BoundCall | None, begun_s: float
+    ) -> None:
+        self._frame, self._on_path, self._on_bound, self._begun_s = source.frame, on_path, on_bound, begun_s
         self._known: dict[str, tuple[float, float, float]] = {}  # by vehicle: cost, bound, seconds of its search
 
     def __call__(self, vehicle: str, state: Progress) -> None:
@@ -236,10 +245,8 @@ def _changed(content: Content, changes: Mapping[str, object]) -> Content:
     for place, value in changes.items():
         if not isinstance(place, str):
             raise UsageError(f"a key is named by text, such as 'limits.min_agl_m'; given {place!r}", where="change()")
-        section = place.split(".")[0].split("[")[0]
         _put(given, place, value)
-        if section in ("terrain", "no_fly") and section in given:  # arrays and GeoJSON are read as at the beginning
-            given[section] = read_content({section: given[section]}, None, held=held)[2][section]
+    given = read_content(given, None, held=held)[2]  # arrays, GeoJSON and tuples as in any mapping
     text = repr(given)
     return replace(content, given=given, held={name: data for name, data in held.items() if repr(name) in text})
 

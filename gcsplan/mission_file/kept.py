@@ -20,6 +20,9 @@ from gcsplan.world.terrain.terrain import OpenTerrain
 MOST_SURFACES = 4
 """Most windows of terrain that are kept: one plan widens its window a few times."""
 
+MOST_CELLS_KEPT = 6_000_000
+"""Most cells of a surface that is kept: some 50 MB for each of its heights."""
+
 T = TypeVar("T")
 
 ReadZones = tuple[Sequence[ZoneDraft], Sequence[Note], Sequence[Mistake]]
@@ -52,6 +55,13 @@ class KeptWorld:
     surfaces: Latest[Surface] = field(default_factory=lambda: Latest(MOST_SURFACES))
     _before: dict[str, tuple[Any, ReadZones]] = field(default_factory=dict)
     _now: dict[str, tuple[Any, ReadZones]] = field(default_factory=dict)
+
+    def surface(self, key: Any, make: Callable[[], Surface]) -> Surface:
+        """The surface of ``key``; one of very many cells is made again the next time."""
+        found = self.surfaces.get(key, make)
+        if found.ground_m.size > MOST_CELLS_KEPT:
+            self.surfaces.known.pop()
+        return found
 
     def begin(self) -> None:
         """A reading begins: zones that the one before did not use are forgotten."""

@@ -127,7 +127,7 @@ class MissionPlane:
         try:
             frame = self.frame
             made_of = (self.terrain, frame.lat_deg, frame.lon_deg, frame.amsl_m, box, most_cells)
-            surface = self.kept.surfaces.get(made_of, partial(self.terrain.load, frame, box, most_cells=most_cells))
+            surface = self.kept.surface(made_of, partial(self.terrain.load, frame, box, most_cells=most_cells))
         except InputError as why:
             problems += why.problems
             return None

@@ -72,6 +72,13 @@ def test_changes_count_from_then_on_or_for_one_plan_alone() -> None:
     assert session.plan().vehicles[0].verdict.length_m > 900
 
 
+def test_values_may_be_tuples_and_numbers_of_numpy() -> None:
+    session = Planner(LEGS)
+    session.change({"vehicles.uav1.speed_m_s": (3, np.float64(12.0)), "limits.min_agl_m": "4e1"})
+    assert session.mission["vehicles"][0]["speed_m_s"] == [3, 12.0]
+    assert session.plan().vehicles[0].verdict.lowest.min_agl_m >= 40.0  # type: ignore[union-attr]
+
+
 def test_zones_and_terrain_of_objects_are_changed_like_keys() -> None:
     vehicle = {"name": "u", "sysid": 1, "autopilot": "arducopter", "start": [36.50, -84.3], "goal": [36.52, -84.3]}
     level = {**TERRAIN, "dem": np.full_like(TERRAIN["dem"], 300.0)}

@@ -72,6 +72,10 @@ class Brief:
     def __repr__(self) -> str:
         return f"<Brief: {self.planner}, {self.objective}, seed {self.seed}>"
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Without a script's function, which another process may not have."""
+        return {**self.__dict__, "own": None}
+
     @property
     def run(self) -> Callable[[Problem], Solution]:
         """The planner."""
