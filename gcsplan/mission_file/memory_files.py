@@ -70,7 +70,7 @@ def with_rasters(terrain: Any, where: str, held: dict[str, bytes]) -> Any:
 
 
 def with_zones(zones: Any, where: str, held: dict[str, bytes]) -> Any:
-    """``no_fly:`` of a script's mission, with names in place of GeoJSON, which is added to ``held``.
+    """``no_fly:`` or ``keep_in:`` of a script's mission, with names in place of GeoJSON, which is added to ``held``.
 
     Raises InputError.
     """
@@ -80,7 +80,7 @@ def with_zones(zones: Any, where: str, held: dict[str, bytes]) -> Any:
     out = []
     for i, entry in enumerate(entries):
         at = f"{where}[{i}]"
-        names = (f"no_fly[{i}]{f'.{k}' if k > 1 else ''}.geojson" for k in count(1))
+        names = (f"{where.rpartition(': ')[2]}[{i}]{f'.{k}' if k > 1 else ''}.geojson" for k in count(1))
         name = next(name for name in names if name not in held)
         if _is_geojson(entry):
             held[name] = _made(at, _json, entry, at)

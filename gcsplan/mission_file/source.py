@@ -162,7 +162,7 @@ class _Plain:
     def of(self, value: Any, where: str, depth: int, key: str = "") -> Any:
         """``value`` of ``key`` at ``where``, which is ``depth`` levels deep."""
         self._values += 1
-        if depth == 1 and key in ("terrain", "no_fly"):
+        if depth == 1 and key in ("terrain", "no_fly", "keep_in"):
             value = (with_rasters if key == "terrain" else with_zones)(value, where, self._held)
         if depth > MAX_YAML_DEPTH or self._values > MAX_YAML_NODES:
             most = f"{MAX_YAML_DEPTH} levels deep" if depth > MAX_YAML_DEPTH else f"{MAX_YAML_NODES} values"

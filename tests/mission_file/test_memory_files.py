@@ -163,6 +163,16 @@ def test_every_form_of_one_zone_gives_the_zone_of_its_file(no_fly: Any, tmp_path
     np.testing.assert_array_equal(found.shape.vertices, of_file.shape.vertices)  # type: ignore[union-attr]
 
 
+def test_areas_to_stay_in_may_be_geojson_too() -> None:
+    ring = [[-84.32, 36.49], [-84.28, 36.49], [-84.28, 36.53], [-84.32, 36.53], [-84.32, 36.49]]
+    area = {"type": "Feature", "properties": {"name": "field"}, "geometry": {"type": "Polygon", "coordinates": [ring]}}
+    outside = mission(keep_in=[area]).zones
+    assert outside
+    small = {**area, "geometry": {"type": "Polygon", "coordinates": [RING]}}
+    with pytest.raises(InputError, match="start"):
+        mission(keep_in=small)
+
+
 def test_shapes_tuples_and_numbers_of_numpy_are_geojson_too() -> None:
     assert len(mission(no_fly=shapely.Polygon(RING)).zones) == 1
     line = {"type": "LineString", "coordinates": [(np.float64(-84.31), 36.51), (-84.3, np.float64(36.511))]}
