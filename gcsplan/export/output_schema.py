@@ -42,7 +42,7 @@ UPLOAD = an_object(
      "simulated": FLAG, "items": COUNT},
     {"seconds": NUMBER, "retries": COUNT, "message": TEXT, "warnings": listed(TEXT)},
 )  # fmt: skip
-FIGURES = {
+COMMON_FIGURES = {
     "items": COUNT, "length_m": NUMBER, "energy_j": MAYBE_NUMBER, "min_agl_m": MAYBE_NUMBER,
     "min_zone_clearance_m": MAYBE_NUMBER, "nearest_zone": MAYBE_TEXT, "max_climb_deg": NUMBER, "safe": MAYBE_FLAG,
     "not_judged": listed(TEXT), "battery_used_percent": MAYBE_NUMBER,
@@ -54,7 +54,7 @@ MORE_FIGURES = {
     "not_judged_data": listed(NOTE), **NOTES, "way_home": an_object({"safe": MAYBE_FLAG}),
 }  # fmt: skip
 VEHICLE_PLAN = an_object(
-    {"name": TEXT, **FIGURES, "lower_bound_m": MAYBE_NUMBER, "gap_percent": MAYBE_NUMBER,
+    {"name": TEXT, **COMMON_FIGURES, "lower_bound_m": MAYBE_NUMBER, "gap_percent": MAYBE_NUMBER,
      "lower_bound_j": MAYBE_NUMBER, "speed_m_s": NUMBER, "depart_s": NUMBER, "arrive_s": NUMBER,
      "stopped_by": {"enum": ["gap", "exhausted", "budget", "evaluations", "time"]},
      "min_agl_at": {"anyOf": [an_object({"leg": COUNT, "lat": NUMBER, "lon": NUMBER}), {"type": "null"}]}},
@@ -84,7 +84,9 @@ FORMS: dict[str, tuple[str, dict[str, Any], dict[str, Any]]] = {
     "check": (
         "check --json",
         {"verdicts": listed({"anyOf": [
-            an_object({"file": TEXT, "vehicle": TEXT, **FIGURES}, {**MORE_FIGURES, "violations": listed(VIOLATION)}),
+            an_object(
+                {"file": TEXT, "vehicle": TEXT, **COMMON_FIGURES}, {**MORE_FIGURES, "violations": listed(VIOLATION)}
+            ),
             an_object({"file": TEXT, "error": ERROR}),
         ]})},
         {"name": TEXT, "inputs": {"type": "object"}, **NOTES, "summary": {"type": "object"}},
