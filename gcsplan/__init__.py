@@ -20,22 +20,55 @@ from types import ModuleType
 
 TYPE_CHECKING = False  # as typing has it, whose import takes as long as all else before a command hears signals
 if TYPE_CHECKING:
-    from gcsplan.app.api import check, rehearse, report, upload, write
+    from gcsplan.app.api import check, clear, download, fetch_dem, new, rehearse, report, upload, verify, write
     from gcsplan.app.fleet.pipeline import load_mission, plan
+    from gcsplan.app.plan.model import FleetPlan, Plan, VehiclePlan
+    from gcsplan.app.session import BetterPath, Planner
+    from gcsplan.app.upload.job import JobResult
+    from gcsplan.check.verdict import LegFigures, Verdict
+    from gcsplan.errors import Cancelled, CheckFailed, GcsplanError, InputError, LinkError, NoMission, UsageError
+    from gcsplan.mavlink.mission.mission import Mission, MissionItem
+    from gcsplan.mission_file.request import MissionFile
+    from gcsplan.notes.note import Finding
+    from gcsplan.planners.problem import Problem, Progress, Refusal, Solution, Via
+    from gcsplan.plugins import register_optimiser, register_output, register_planner, register_zone_reader
+    from gcsplan.sim.outcome import Rehearsal
+    from gcsplan.world.geometry.path import Path
 
-__all__ = ["__version__", "check", "load_mission", "plan", "rehearse", "report", "upload", "write"]
 __version__ = "0.2.0"
 
-_MODULE_OF = {
-    "load_mission": "gcsplan.app.fleet.pipeline",
-    "plan": "gcsplan.app.fleet.pipeline",
-    "check": "gcsplan.app.api",
-    "rehearse": "gcsplan.app.api",
-    "report": "gcsplan.app.api",
-    "upload": "gcsplan.app.api",
-    "write": "gcsplan.app.api",
-}
-"""The module of each function, which is imported at its first use, so that the command line starts fast."""
+_NAMES = {
+    "gcsplan.app.fleet.pipeline": ("load_mission", "plan"),
+    "gcsplan.app.api": (
+        "check", "clear", "download", "fetch_dem", "new", "rehearse", "report", "upload", "verify", "write",
+    ),
+    "gcsplan.app.plan.model": ("FleetPlan", "Plan", "VehiclePlan"),
+    "gcsplan.app.upload.job": ("JobResult",),
+    "gcsplan.check.verdict": ("LegFigures", "Verdict"),
+    "gcsplan.app.session": ("BetterPath", "Planner"),
+    "gcsplan.errors": (
+        "Cancelled", "CheckFailed", "GcsplanError", "InputError", "LinkError", "NoMission", "UsageError",
+    ),
+    "gcsplan.mavlink.mission.mission": ("Mission", "MissionItem"),
+    "gcsplan.mission_file.request": ("MissionFile",),
+    "gcsplan.notes.note": ("Finding",),
+    "gcsplan.planners.problem": ("Problem", "Progress", "Refusal", "Solution", "Via"),
+    "gcsplan.plugins": (
+        "register_optimiser", "register_output", "register_planner", "register_zone_reader",
+    ),
+    "gcsplan.sim.outcome": ("Rehearsal",),
+    "gcsplan.world.geometry.path": ("Path",),
+}  # fmt: skip
+_MODULE_OF = {name: module for module, names in _NAMES.items() for name in names}
+"""The module of each name, which is imported at its first use, so that the command line starts fast."""
+
+__all__ = [
+    "BetterPath", "Cancelled", "CheckFailed", "Finding", "FleetPlan", "GcsplanError", "InputError", "JobResult",
+    "LegFigures", "LinkError", "Mission", "MissionFile", "MissionItem", "NoMission", "Path", "Plan", "Planner",
+    "Problem", "Progress", "Refusal", "Rehearsal", "Solution", "UsageError", "VehiclePlan", "Verdict", "Via",
+    "__version__", "check", "clear", "download", "fetch_dem", "load_mission", "new", "plan", "register_optimiser",
+    "register_output", "register_planner", "register_zone_reader", "rehearse", "report", "upload", "verify", "write",
+]  # fmt: skip
 
 
 def __getattr__(name: str) -> object:

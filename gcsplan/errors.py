@@ -7,6 +7,7 @@
     ├── CheckFailed    (RuntimeError)     4  a check or a rehearsal found a violation, or could not judge
     ├── VehicleRefused (ConnectionError)  5  the vehicle refused, or gcsplan refused to send
     ├── LinkError      (ConnectionError)  6  the link is dead, or the outcome is unknown
+    ├── Cancelled                       130  the caller cancelled the work
     └── ReadBackDiffers (RuntimeError)    7  the list on board differs from the list that was sent
 
 A message states what was required, what was given, where, and what to do about it.
@@ -14,8 +15,9 @@ A message states what was required, what was given, where, and what to do about 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Literal
@@ -142,6 +144,33 @@ class CheckFailed(GcsplanError, RuntimeError):
     def __init__(self, message: str, *, lines: Iterable[str] = (), where: str = "", reason: str = "") -> None:
         super().__init__("\n".join([message, *lines]), where=where, reason=reason)
         self.headline = message
+
+
+class Cancelled(GcsplanError):
+    """The caller ended the work (`cancelled_by`)."""
+
+    exit_code = 130
+    default_reason = "cancelled"
+
+
+_cancelled: ContextVar[Callable[[], bool] | None] = ContextVar("cancelled", default=None)
+
+
+@contextmanager
+def cancelled_by(is_cancelled: Callable[[], bool]) -> Iterator[None]:
+    """What runs within, in this thread, ends with `Cancelled` soon after ``is_cancelled`` returns True."""
+    token = _cancelled.set(is_cancelled)
+    try:
+        yield
+    finally:
+        _cancelled.reset(token)
+
+
+def heed_cancel() -> None:
+    """Raise `Cancelled` if the caller has ended the work: for loops that may take longer than some milliseconds."""
+    is_cancelled = _cancelled.get()
+    if is_cancelled is not None and is_cancelled():
+        raise Cancelled("cancelled by its caller; nothing was written")
 
 
 class VehicleRefused(GcsplanError, ConnectionError):

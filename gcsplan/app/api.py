@@ -38,9 +38,10 @@ from gcsplan.mission_file import MissionFile, load_mission
 from gcsplan.units import units_of
 
 if TYPE_CHECKING:
+    from gcsplan.dem.fetch import Fetched, FetchProgress
     from gcsplan.sim.outcome import Rehearsal
 
-__all__ = ["check", "rehearse", "report", "upload", "write"]
+__all__ = ["check", "clear", "download", "fetch_dem", "new", "rehearse", "report", "upload", "verify", "write"]
 
 UnitsName = Literal["metric", "imperial", "aviation"]
 
@@ -277,3 +278,142 @@ def rehearse(
     return rehearsing.rehearse(
         planned, weather=weather, runs=runs, seed=seed, progress=progress, jobs=jobs, cluster=cluster
     )
+
+
+def verify(
+    file: str | os.PathLike[str],
+    url: str,
+    within: Plan | Source | None = None,
+    *,
+    sysid: int = 1,
+    tolerance_m: float | None = None,
+    allow_parameters: bool = False,
+    timeout_s: float = 60.0,
+) -> JobResult:
+    """Compare a `.waypoints` or `.plan` file with the mission on board at ``url``; the vehicle keeps what it has.
+
+    With ``within`` (a plan, a mission, or anything that `load_mission` accepts) the mission on board is also judged
+    there with the vehicle's parameters, and ``file`` may be ``NAME=FILE``, by the vehicle's name; its number then
+    replaces ``sysid``. ``tolerance_m``: with ``within``, positions that are at most so far away, m, are no difference.
+
+    The result's ``verified`` is True only if exactly this file is on board (and is safe); ``message`` says what is
+    not. Raises InputError for a bad file, UsageError for bad arguments, LinkError if nobody answers.
+    """
+    require(
+        "verify", file=file, url=url, sysid=sysid, tolerance_m=tolerance_m, timeout_s=timeout_s
+    )  # fmt: skip
+    source = within.source if isinstance(within, Plan) else within
+    if source is not None and not isinstance(source, MissionFile):
+        source = load_mission(source)
+    return uploads.verify_file(
+        os.fspath(file), url, sysid, source=source, tolerance_m=tolerance_m, timeout_s=timeout_s,
+        allow_parameters=allow_parameters,
+    )  # fmt: skip
+
+
+def download(
+    url: str, file: str | os.PathLike[str] | None = None, *, sysid: int = 1, timeout_s: float = 60.0
+) -> Mission:
+    """Read the mission on board at ``url``; nothing is written to the vehicle.
+
+    With ``file``, a name that ends in `.waypoints` or `.plan`, it is also written there. The result can be handed to
+    `check`. Raises LinkError if nobody answers, UsageError for a bad name.
+    """
+    require("download", url=url, file=file, sysid=sysid, timeout_s=timeout_s)
+    if file is None:
+        return uploads.mission_on_board(url, sysid, f"vehicle {sysid}", timeout_s=timeout_s)
+    return uploads.download_to(url, sysid, Path(file), timeout_s=timeout_s)
+
+
+def clear(
+    url: str, kind: str = "mission", *, sysid: int = 1, allow_armed: bool = False, timeout_s: float = 60.0
+) -> None:
+    """Remove the ``mission``, ``fence`` or ``rally`` points on board at ``url``, and read back that nothing is left.
+
+    Raises VehicleRefused, LinkError, and UsageError for another ``kind``.
+    """
+    require("clear", url=url, kind=kind, sysid=sysid, timeout_s=timeout_s)
+    uploads.clear(url, sysid, kind, allow_armed=allow_armed, timeout_s=timeout_s)
+
+
+def new(
+    start: str,
+    goal: str,
+    *,
+    dem: str | Sequence[str] = (),
+    flat_m: float | None = None,
+    vertical_datum: str | None = None,
+    autopilot: str = "arducopter",
+    sysid: int = 1,
+    min_agl_m: float = 60.0,
+    file: str | os.PathLike[str] | None = None,
+) -> str:
+    """The text of a new mission file with a comment on every key, read and judged once.
+
+    ``start``, ``goal`` are places as text (degrees, degrees with minutes, UTM, MGRS). The ground is ``dem`` (rasters,
+    relative to ``file``) or flat at ``flat_m`` metres above sea level; it is never assumed. With ``file`` the text is
+    also written there, unless a file is there already. Raises InputError, UsageError.
+
+    Examples:
+        >>> from gcsplan import load_mission, new
+        >>> text = new("36.6, -84.3", "36.61, -84.3", flat_m=300)
+        >>> load_mission(text).vehicles[0].vehicle.limits.min_agl_m
+        60.0
+    """
+    from gcsplan.app.new_mission import OPTIONS, checked_text
+    from gcsplan.mission_file.new_file import Draft, place_text
+    from gcsplan.vehicle import Autopilot
+
+    require("new", start=start, goal=goal, flat_m=flat_m, min_agl_m=min_agl_m, sysid=sysid, file=file)
+    rasters = (dem,) if isinstance(dem, str) else tuple(dem)
+    if bool(rasters) == (flat_m is not None):
+        raise UsageError("the ground is `dem` or `flat_m`: give one of them", where="new()")
+    if autopilot not in tuple(Autopilot):
+        raise UsageError(f"autopilot is one of {', '.join(Autopilot)}; given {autopilot!r}", where="new()")
+    try:
+        begin, end = place_text(start), place_text(goal)
+    except ValueError as why:
+        raise UsageError(f"start and goal are places: {why}", where="new()") from None
+    target = Path("mission.yaml" if file is None else file)
+    if file is not None and target.exists():
+        raise UsageError(f"{target} is there already; give another name, or remove it", where="new()")
+    draft = Draft(
+        start=begin, goal=end, dem=rasters, vertical_datum=vertical_datum, flat_m=flat_m,
+        autopilot=Autopilot(autopilot), sysid=sysid, min_agl_m=min_agl_m,
+    )  # fmt: skip
+    names = {key: option.removeprefix("--").replace("-", "_") for key, option in OPTIONS.items()}
+    text, _ = checked_text(draft, target, names)
+    if file is not None:
+        write_whole(target, text)
+    return text
+
+
+def fetch_dem(
+    mission: str | os.PathLike[str] | Mapping[str, Any] | None = None,
+    *,
+    around: str | None = None,
+    radius_km: float | None = None,
+    tiles: str | None = None,
+    source: str | None = None,
+    mirror: str = "",
+    offline: bool = False,
+    progress: FetchProgress | None = None,
+) -> Sequence[Fetched]:
+    """Bring terrain of a published source into the cache, from where missions take it: the only use of the network.
+
+    The area is one of three: a ``mission``'s, ``around`` a place within ``radius_km``, or ``tiles`` by name.
+    ``offline``: only look whether it is there. ``progress(name, bytes, whole)`` is called meanwhile. Returns a row for
+    each tile. Raises InputError, UsageError, and LinkError if some tiles could not be had; the others stay.
+    """
+    from gcsplan.app.tiles import tiles_of
+    from gcsplan.dem.cache import Cache
+    from gcsplan.dem.fetch import Fetch
+
+    require(
+        "fetch_dem", around=around, radius_km=radius_km, tiles=tiles, source=source, progress=progress
+    )  # fmt: skip
+    chosen, cells = tiles_of(mission, around, radius_km, tiles, source)
+    cache = Cache(chosen)
+    if offline:
+        return Fetch(cache).look(cells)
+    return Fetch(cache, mirror=mirror, progress=progress).run(cells)

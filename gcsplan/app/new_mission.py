@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from gcsplan.app.upload import run as uploads
@@ -97,16 +99,18 @@ def _start(state: VehicleState) -> tuple[str | None, list[Note]]:
     return f"{state.lat_deg:.7f}, {state.lon_deg:.7f}", notes
 
 
-def checked_text(draft: Draft, file: Path) -> tuple[str, tuple[Note, ...]]:
+def checked_text(
+    draft: Draft, file: Path, options: Mapping[str, str] = MappingProxyType(OPTIONS)
+) -> tuple[str, tuple[Note, ...]]:
     """The mission file's text, and the notes of its reader. Raises InputError with the option of each mistake."""
     text = text_of(draft, file.name, file.stem)
     try:
         return text, load_mission(file, text=text).notes
     except InputError as error:
-        raise InputError.of([_renamed(problem, f"{file}: ") for problem in error.problems]) from None
+        raise InputError.of([_renamed(problem, f"{file}: ", options) for problem in error.problems]) from None
 
 
-def _renamed(problem: Mistake, where: str) -> Mistake:
+def _renamed(problem: Mistake, where: str, options: Mapping[str, str]) -> Mistake:
     """The problem at its option, without the line of a file that is not written."""
     place = problem.where.removeprefix(where)
-    return replace(problem, where=OPTIONS.get(place, problem.where), message=problem.message.removesuffix(problem.line))
+    return replace(problem, where=options.get(place, problem.where), message=problem.message.removesuffix(problem.line))

@@ -121,6 +121,14 @@ class Verdict:
     paper_energy: bool = False
     extent: FlightExtent | None = None
 
+    def __repr__(self) -> str:
+        return f"<Verdict of {self.mission.name!r}: {self.word}, {len(self.legs)} legs, {self.length_m:.0f} m>"
+
+    @property
+    def word(self) -> str:
+        """The verdict in a word or two."""
+        return {True: "safe", False: f"{len(self.findings)} findings", None: "not judged"}[self.safe]
+
     def reported_j(self, joules: float) -> float | None:
         """An energy of this flight for people and files: None unless the vehicle's energy was given."""
         return joules if self.energy_stated else None

@@ -60,7 +60,13 @@ def write_summary(summary: Mapping[str, Any], *, clocks: bool = False) -> str:
     lower bounds (``min_…``, ``lower_bound_…``) are rounded down, greatest values (``max_…``) up, so that none looks
     better than it is. Raises TypeError for a type that JSON lacks.
     """
-    return _text(_plain({"schema": SCHEMA, **summary}, "", clocks), lines=True) + "\n"
+    return _text(document(summary, clocks=clocks), lines=True) + "\n"
+
+
+def document(summary: Mapping[str, Any], *, clocks: bool = False) -> dict[str, Any]:
+    """What `write_summary` writes, as plain values."""
+    plain: dict[str, Any] = _plain({"schema": SCHEMA, **summary}, "", clocks)
+    return plain
 
 
 def json_of(value: Mapping[str, Any], key: str, *, lines: bool = True) -> str:

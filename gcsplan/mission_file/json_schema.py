@@ -58,14 +58,14 @@ def describe(kind: type[Keys], key: str) -> str:
 
 def mission_schema() -> dict[str, Any]:
     """The JSON Schema of the whole file."""
-    from gcsplan.planners.registry import names
+    from gcsplan.planners.registry import PLANNER_PACKAGES
 
     whole = schema.MissionKeys.model_json_schema()
     parts = whole.pop("$defs")
     kinds = {kind.__name__: kind for kind in _kinds(Keys)}
     for name, part in parts.items():
         _complete(part, kinds[name])
-    parts["PlannerKeys"]["properties"]["name"]["enum"] = list(names())
+    parts["PlannerKeys"]["properties"]["name"]["enum"] = list(PLANNER_PACKAGES)
     _complete(whole, schema.MissionKeys)
     for key, entry in whole["properties"].items():
         if key not in whole["required"] and not _takes_null(entry):  # the reader takes a key without a value for absent

@@ -13,9 +13,10 @@ from datetime import datetime
 from functools import partial
 from typing import Any, get_args
 
-from gcsplan.errors import InputError, Mistake
+from gcsplan.errors import InputError, Mistake, heed_cancel
 from gcsplan.mavlink.mission.mission import AltitudeFrame
 from gcsplan.mission_file.changes import MissionChange, changed
+from gcsplan.mission_file.kept import KeptWorld, ReadZones
 from gcsplan.mission_file.published.times import Hours, hours_of, texts_of
 from gcsplan.mission_file.published.unused import (
     faults_near,
@@ -120,7 +121,10 @@ def load_mission(
 
     ``source`` is one of: the path of a mission file (a ``str`` without a line break, or a path object), or
     ``sample:NAME`` for one that comes with gcsplan (``sample:jacksboro``); the YAML text of one (a ``str`` with a line
-    break); a mapping of the same keys, which may contain lists, tuples and numpy numbers.
+    break); a mapping of the same keys, which may contain lists, tuples and numpy numbers. In a mapping,
+    ``terrain["dem"]`` may be an array of heights with its ``transform`` and ``crs``, an open rasterio dataset or a
+    rioxarray DataArray, or a list of the last two, and ``no_fly`` may be or contain GeoJSON (as mappings, by
+    ``__geo_interface__``, or a GeoDataFrame); so may the ``file`` of one of its entries.
     With ``text``, that is the content, and ``source`` is the path that it would have (or None). Files that a mission
     names are found relative to its own path, or else to the current folder.
 
@@ -132,7 +136,7 @@ def load_mission(
 
     Returns a `MissionFile`: vehicles, zones and terrain in metres. Raises InputError with every problem that was found,
     each with its place (file and key, such as ``vehicles[1].speed_m_s``; a mission without a file is called
-    ``mission``), and TypeError if ``source`` is none of these.
+    ``mission``), and UsageError if ``source`` is none of these.
 
     Examples:
         >>> mission = load_mission({
@@ -145,7 +149,7 @@ def load_mission(
         >>> [request.vehicle.name for request in mission.vehicles]
         ['uav1']
     """
-    file, where, raw, written = read_content(source, text)
+    file, where, raw, written, held = read_content(source, text)
     if "version" in raw and (raw["version"] != 1 or isinstance(raw["version"], bool | float)):
         words = f"this gcsplan reads version 1, given {shown(raw['version'])}; write `version: 1`, or update gcsplan"
         raise InputError(words, where=f"{where}: version")
@@ -153,26 +157,46 @@ def load_mission(
     keys = [MissionChange("", "terrain", key, value) for key, value in (terrain or {}).items()]
     made = changed(raw, [*keys, *changes], file.parent)
     return load_content(
-        Content(file, where, made.raw, written, names, tuple(around), departure, texts_of(at), made.options, made.notes)
+        Content(
+            file,
+            where,
+            made.raw,
+            written,
+            names,
+            tuple(around),
+            departure,
+            texts_of(at),
+            made.options,
+            made.notes,
+            held,
+        )
     )
 
 
-def load_content(content: Content) -> MissionFile:
-    """Read a mission again from what it was read from before. Raises InputError."""
-    return _MissionReading(content).mission()
+def load_content(content: Content, kept: KeptWorld | None = None) -> MissionFile:
+    """Read a mission again from what it was read from before. ``kept``: what the reading before kept, and this one
+    keeps. Raises InputError."""
+    return _MissionReading(content, kept or KeptWorld()).mission()
+
+
+def _reaching(content: Content, places: Sequence[tuple[float, float]]) -> MissionFile:
+    """See `MissionFile.reaching`."""
+    return load_content(replace(content, around=tuple(places)))
 
 
 def read_no_fly(source: str | os.PathLike[str], at: Sequence[str] | None = None) -> tuple[list[ZoneDraft], list[Note]]:
     """All zones of a mission file, used or not, and the notes on them, whatever else is wrong. Raises InputError."""
-    file, where, raw, written = read_content(source, None)
-    return _MissionReading(Content(file, where, raw, written, at=texts_of(at))).zones_alone()
+    file, where, raw, written, _ = read_content(source, None)
+    return _MissionReading(Content(file, where, raw, written, at=texts_of(at)), KeptWorld()).zones_alone()
 
 
 class _MissionReading:
     """One pass over one file: the steps in order, and the problems found so far."""
 
-    def __init__(self, content: Content) -> None:
+    def __init__(self, content: Content, kept: KeptWorld) -> None:
         self.content, self.file, self.text = content, content.file, content.text
+        self.kept = kept
+        kept.begin()
         self.where = f"{content.where}: "
         self.units = in_own_units(content.given, self.where)
         self.raw = self.units.raw
@@ -205,7 +229,7 @@ class _MissionReading:
         published, inside = self._zones(hours)
         drafts = used(published)
 
-        spec = None if terrain_keys is None else make_spec(terrain_keys, self.file.parent)
+        spec = None if terrain_keys is None else make_spec(terrain_keys, self.file.parent, self.content.held)
         terrain = None if spec is None else self._open(spec)
         places = [p for s in terminals for p in s.all]
         if terrain is not None:
@@ -227,7 +251,7 @@ class _MissionReading:
                 self.notes += not_understood_far(placed, far, box)
                 self.notes += unused_notes(published, frame, box)
                 areas = self._areas(inside, frame)
-                site = MissionPlane(here, frame, box, placed, areas, terminals, set(places), self.local)
+                site = MissionPlane(here, frame, box, placed, areas, terminals, set(places), self.local, self.kept)
                 ground = site.load(problems)
         if problems or frame is None or site is None or ground is None:
             raise self._refusal(problems)
@@ -241,7 +265,7 @@ class _MissionReading:
             altitude_frame=altitude_frame, terrain_error_m=terrain_error_m, local=self.local, inputs=inputs,
             notes=tuple(dict.fromkeys(self.notes)), way_home=way_home, geoid=site.terrain.geoid,
             hours=hours if left_out_by_hours(published) else None,
-            reaching=self._reaching, content=self.content,
+            reaching=partial(_reaching, self.content), content=self.content,
         )  # fmt: skip
         return replace(source, wider=partial(site.wider, source), at_level=partial(site.at_level, source))
 
@@ -254,9 +278,6 @@ class _MissionReading:
         if self.problems:
             raise self._refusal(self.problems)
         return [*published, *inside], list(dict.fromkeys(self.notes))
-
-    def _reaching(self, places: Sequence[tuple[float, float]]) -> MissionFile:
-        return load_content(replace(self.content, around=tuple(places)))
 
     def _refusal(self, problems: list[Mistake]) -> InputError:
         """All problems as the user wrote the keys, with their lines if the mission was a text."""
@@ -321,9 +342,9 @@ class _MissionReading:
         keys: PlannerKeys = self._section(PlannerKeys, "planner") or PlannerKeys()
         known = self.content.planner_names
         if known is None:
-            from gcsplan.planners.registry import names
+            from gcsplan.planners.registry import PLANNER_PACKAGES, names
 
-            known = names()
+            known = tuple(PLANNER_PACKAGES) if keys.name in PLANNER_PACKAGES else names()
         if keys.name not in known:
             near = nearest(keys.name, known) or f"; known are {', '.join(known)}"
             self.problems.append(Mistake(f"{self.where}planner.name", f"no planner is named {keys.name[:64]!r}{near}"))
@@ -394,6 +415,7 @@ class _MissionReading:
                 words = f"must be a list of {what}, given {shown(value)}{dash}{empty}"
                 self.problems.append(Mistake(self.where + key, words))
             for i, one in enumerate(self._list(key)):
+                heed_cancel()
                 at, entry = f"{self.where}{key}[{i}]", f"{key}[{i}]"
                 keys = read_section(ZoneKeys, one, at, self.problems)
                 if keys is None:
@@ -401,11 +423,12 @@ class _MissionReading:
                 if keys.name is not None and (first := inline.setdefault(keys.name, entry)) != entry:
                     words = f"{keys.name[:64]!r} is the name of {first} already; change one"
                     self.problems.append(Mistake(f"{at}.name", words))
-                found = make_zones(
-                    keys, at, self.file.parent, entry, self.problems, self.notes, local=self.local, hours=hours,
-                    keep_in=key == "keep_in",
-                )  # fmt: skip
-                drafts += as_keep_in(found, at, self.problems) if key == "keep_in" else found
+                made_of = (one, hours, self.local, self.content.held.get(keys.file or ""))
+                made = partial(self._entry, keys, at, entry, hours, keep_in=key == "keep_in")
+                found, notes, problems = self.kept.zones(at, made_of, made)
+                drafts += found
+                self.notes += notes
+                self.problems += problems
         return apart(uniquely_named(drafts), self.problems)
 
     def _areas(self, inside: Sequence[ZoneDraft], frame: Frame) -> tuple[KeepIn, ...]:
@@ -414,6 +437,16 @@ class _MissionReading:
         except InputError as why:
             self.problems += why.problems
             return ()
+
+    def _entry(self, keys: ZoneKeys, at: str, entry: str, hours: Hours | None, *, keep_in: bool) -> ReadZones:
+        """The zones of one entry of ``no_fly`` or ``keep_in``, notes on them and mistakes."""
+        notes: list[Note] = []
+        problems: list[Mistake] = []
+        found = make_zones(
+            keys, at, self.file.parent, entry, problems, notes, local=self.local, hours=hours, keep_in=keep_in,
+            held=self.content.held,
+        )  # fmt: skip
+        return as_keep_in(found, at, problems) if keep_in else found, notes, problems
 
     def _far(self, far: list[ZoneDraft], frame: Frame) -> None:
         """Report zones too far away to matter: a mistake in this file, but normal in a zone file of a whole country."""
@@ -438,7 +471,7 @@ class _MissionReading:
             )
             return None
         try:
-            return opened(spec, where=where)
+            return self.kept.terrain.get((spec, where), partial(opened, spec, where=where))
         except InputError as why:
             self.problems += why.problems
             return None

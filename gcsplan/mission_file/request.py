@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
@@ -91,8 +91,8 @@ class Content:
     """The source of a mission, from which any process can read it again.
 
     ``where`` is its name in messages, ``given`` the mapping of keys after all ``changes``, ``text`` the text before
-    them if it has one. ``options``: keys that a change has set, each with the option. The others are as in
-    `load_mission`.
+    them if it has one. ``options``: keys that a change has set, each with the option. ``held``: the files
+    that a script gave as objects, by the names that ``given`` has for them. The others are as in `load_mission`.
     """
 
     file: Path
@@ -105,6 +105,7 @@ class Content:
     at: tuple[str, ...] | None = None
     options: tuple[tuple[str, str], ...] = ()
     changes: tuple[Note, ...] = ()
+    held: Mapping[str, bytes] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,3 +151,10 @@ class MissionFile:
     def changes(self) -> tuple[Note, ...]:
         """A note on each change of the document that was made before it was read."""
         return () if self.content is None else self.content.changes
+
+    def __repr__(self) -> str:
+        return f"<MissionFile {self.name!r}: {len(self.vehicles)} vehicles, {len(self.zones)} zones>"
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without what loads more terrain: a copy in another process has the terrain that it had here."""
+        return {**self.__dict__, "wider": None, "at_level": None}

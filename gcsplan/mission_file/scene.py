@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 
@@ -45,6 +46,8 @@ OF_FILES = {"kinds", "authorised", "flight_level_error_m"}
 """Keys of a zone that belong to a file of an authority."""
 
 _MANY_NODES = 250_000
+
+NO_FILES: Mapping[str, bytes] = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,11 +99,13 @@ def place_notes(point: Degrees, where: str) -> list[Note]:
     return [point.note.of(place=where.split(": ", 1)[-1])] if point.note else []
 
 
-def make_spec(keys: TerrainKeys, folder: Path) -> TerrainSpec:
-    """The terrain in the form of `gcsplan.world.terrain.terrain`; paths are relative to the mission file's folder."""
+def make_spec(keys: TerrainKeys, folder: Path, held: Mapping[str, bytes] = NO_FILES) -> TerrainSpec:
+    """The terrain in the form of `gcsplan.world.terrain.terrain`; paths are relative to the mission file's folder,
+    but for the names of ``held`` files."""
     dem = () if keys.dem is None else (keys.dem,) if isinstance(keys.dem, str) else tuple(keys.dem)
     return TerrainSpec(
-        dem=tuple(d if d.startswith("sample:") else source_or_path(d, folder) for d in dem),
+        dem=tuple(d if d.startswith("sample:") or d in held else source_or_path(d, folder) for d in dem),
+        held={d: held[d] for d in dem if d in held},
         vertical_datum=keys.vertical_datum,
         geoid_grid=None if keys.geoid_grid is None else str(folder / keys.geoid_grid),
         crs=keys.crs,
@@ -211,11 +216,12 @@ def make_box(points: Sequence[tuple[float, float]], zones: Sequence[Zone], *, lo
 
 def make_zones(
     keys: ZoneKeys, where: str, folder: Path, fallback: str, problems: list[Mistake], notes: list[Note], *, local: bool,
-    hours: Hours | None = None, keep_in: bool = False,
+    hours: Hours | None = None, keep_in: bool = False, held: Mapping[str, bytes] = NO_FILES,
 ) -> list[ZoneDraft]:  # fmt: skip
     """The zones of one entry of ``no_fly`` or ``keep_in``: a single one, or all of a file, at the mission's ``hours``.
 
     With ``keep_in`` a file's holes are left out of its areas, and no file of an authority is read.
+    ``held``: files that lie on no disk, by their names.
     """
     kinds = [k for k in ("center", "polygon", "line", "file") if getattr(keys, k) is not None]
     if len(kinds) != 1:
@@ -224,7 +230,9 @@ def make_zones(
         problems.append(Mistake(where, f"{choices}, given {given}"))
         return []
     if keys.file is not None:
-        return _zones_of_file(keys, keys.file, where, folder, problems, notes, hours, keep_in=keep_in)
+        data = held.get(keys.file)
+        path = folder / keys.file if data is None else Path(keys.file)
+        return _zones_of_file(keys, path, data, where, problems, notes, hours, keep_in=keep_in)
     for key in sorted({"on_bad", "ignore", *OF_FILES} & keys.given.keys()):
         whose = " of an authority" if key in OF_FILES else ""
         problems.append(Mistake(f"{where}.{key}", f"belongs to a file{whose}"))
@@ -232,7 +240,7 @@ def make_zones(
 
 
 def _zones_of_file(
-    keys: ZoneKeys, file: str, where: str, folder: Path, problems: list[Mistake], notes: list[Note],
+    keys: ZoneKeys, path: Path, data: bytes | None, where: str, problems: list[Mistake], notes: list[Note],
     hours: Hours | None, *, keep_in: bool,
 ) -> list[ZoneDraft]:  # fmt: skip
     others = sorted(keys.given.keys() - {"file", "layer", "on_bad", "ignore", *SIZE_KEYS, *OF_FILES})
@@ -251,8 +259,8 @@ def _zones_of_file(
             kinds, tuple(keys.authorised), hours, keys.flight_level_error_m, where, keys.on_bad, tuple(keys.ignore)
         )
         found = read_zones(
-            folder / file, where=f"{where}.file", radius_m=keys.radius_m, buffer_m=keys.buffer_m, layer=keys.layer,
-            policy=policy, keep_in=keep_in,
+            path, where=f"{where}.file", radius_m=keys.radius_m, buffer_m=keys.buffer_m, layer=keys.layer,
+            policy=policy, data=data, keep_in=keep_in,
         )  # fmt: skip
     except InputError as why:
         problems += why.problems

@@ -15,9 +15,17 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from gcsplan.errors import InputError
-from gcsplan.mission_file.values.schema import nearest, shown
-from gcsplan.mission_file.values.yaml import MAX_YAML_BYTES, MAX_YAML_DEPTH, MAX_YAML_NODES, missing_space, read_yaml
+from gcsplan.errors import InputError, UsageError
+from gcsplan.mission_file.memory_files import with_rasters, with_zones
+from gcsplan.mission_file.values.schema import nearest, shown, text_keys
+from gcsplan.mission_file.values.yaml import (
+    MAX_YAML_BYTES,
+    MAX_YAML_DEPTH,
+    MAX_YAML_NODES,
+    missing_space,
+    number_or_text,
+    read_yaml,
+)
 from gcsplan.world.terrain.input_files import LOG_FILES, TERRAIN_FILES, VEHICLE_FILES, ZONES_BY_NAME, tell_file
 
 SAMPLE_PREFIX = "sample:"
@@ -67,19 +75,24 @@ UNNAMED = Path("mission.yaml")
 def read_content(
     source: str | os.PathLike[str] | Mapping[str, Any] | None,
     text: str | None,
-) -> tuple[Path, str, dict[str, Any], str | None]:
-    """The file, its name in messages, the mapping of keys, and its text if it has one.
+    held: dict[str, bytes] | None = None,
+) -> tuple[Path, str, dict[str, Any], str | None, dict[str, bytes]]:
+    """The file, its name in messages, the mapping of keys, its text if it has one, and files that lie on no disk.
 
-    Raises InputError and TypeError as `load_mission`.
+    ``held``: files that have names already.
+    Raises InputError and UsageError as `load_mission`.
     """
+    held = {} if held is None else held
     if isinstance(source, str) and ("\n" in source or "\r" in source):
         if text is not None:
-            raise TypeError("load_mission takes one text: the first argument is the file's path where text= is given")
+            raise UsageError(
+                "load_mission takes one text: the first argument is the file's path where text= is given", where="text"
+            )
         source, text = None, source
     if isinstance(source, Mapping):
         if text is not None:
-            raise TypeError("load_mission takes a mapping or a text, not both")
-        file, where, raw = UNNAMED, "mission", _Plain().of(source, "mission", 0)
+            raise UsageError("load_mission takes a mapping or a text, not both", where="text")
+        file, where, raw = UNNAMED, "mission", _Plain(held).of(source, "mission", 0)
     elif isinstance(source, str | os.PathLike):
         file, where = Path(source), str(source)
         if text is None:
@@ -90,14 +103,15 @@ def read_content(
     elif source is None and text is not None:
         file, where, raw = UNNAMED, "mission", read_yaml(text, where="mission")
     else:
-        raise TypeError(
-            f"load_mission takes a path, the text of a mission file, or a mapping, given {type(source).__name__}"
+        raise UsageError(
+            f"load_mission takes a path, the text of a mission file, or a mapping, given {type(source).__name__}",
+            where="source",
         )
     if not isinstance(raw, dict):
         tight = missing_space(raw) if isinstance(raw, str) else ""
         words = f"a mission file is a mapping of keys (version, terrain, …), given {shown(raw)}"
         raise InputError(f"{words}; {tight}" if tight else words, where=where)
-    return file, where, raw, text
+    return file, where, raw, text, held
 
 
 def _read(file: Path, where: str) -> tuple[str, Any]:
@@ -137,14 +151,19 @@ def _text(file: Path, where: str) -> str:
 
 
 class _Plain:
-    """Copies a script's mapping into YAML's types: tuples become lists, numpy's numbers become Python's."""
+    """Copies a script's mapping into YAML's types: tuples become lists, numpy's numbers become Python's.
 
-    def __init__(self) -> None:
-        self._values = 0
+    Terrain and zones that are objects become files in ``held``, and their names take their places.
+    """
 
-    def of(self, value: Any, where: str, depth: int) -> Any:
-        """``value`` at ``where``, which is ``depth`` levels deep."""
+    def __init__(self, held: dict[str, bytes]) -> None:
+        self._values, self._held = 0, held
+
+    def of(self, value: Any, where: str, depth: int, key: str = "") -> Any:
+        """``value`` of ``key`` at ``where``, which is ``depth`` levels deep."""
         self._values += 1
+        if depth == 1 and key in ("terrain", "no_fly", "keep_in"):
+            value = (with_rasters if key == "terrain" else with_zones)(value, where, self._held)
         if depth > MAX_YAML_DEPTH or self._values > MAX_YAML_NODES:
             most = f"{MAX_YAML_DEPTH} levels deep" if depth > MAX_YAML_DEPTH else f"{MAX_YAML_NODES} values"
             raise InputError(f"the mission has more than {most}", where=where)
@@ -152,20 +171,21 @@ class _Plain:
             return value
         for kind in (bool, int, float, str):
             if isinstance(value, kind):
-                return kind(value)
+                plain = kind(value)
+                return number_or_text(plain) if isinstance(plain, str) and key not in text_keys() else plain
         if isinstance(value, os.PathLike):
             return os.fspath(value)
         if isinstance(value, Mapping):
-            for key in value:
-                if not isinstance(key, str):
-                    raise InputError(f"a key is text, given {key!r}", where=where)
+            for name in value:
+                if not isinstance(name, str):
+                    raise InputError(f"a key is text, given {name!r}", where=where)
             # Within the file a place is a key path; before it are the name of the file and ": ".
-            return {str(k): self.of(v, f"{where}: {k}" if not depth else f"{where}.{k}", depth + 1)
+            return {str(k): self.of(v, f"{where}: {k}" if not depth else f"{where}.{k}", depth + 1, k)
                     for k, v in value.items()}  # fmt: skip
         if isinstance(value, list | tuple):
-            return [self.of(v, f"{where}[{k}]", depth + 1) for k, v in enumerate(value)]
+            return [self.of(v, f"{where}[{k}]", depth + 1, key) for k, v in enumerate(value)]
         if hasattr(value, "tolist"):  # numpy's arrays and numbers
-            return self.of(value.tolist(), where, depth + 1)
+            return self.of(value.tolist(), where, depth + 1, key)
         raise InputError(
             f"a value is text, a number, true, false, a list or a mapping, given {type(value).__name__}", where=where
         )

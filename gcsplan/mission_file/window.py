@@ -14,7 +14,8 @@ from weakref import WeakValueDictionary
 
 import numpy as np
 
-from gcsplan.errors import InputError, Mistake
+from gcsplan.errors import InputError, Mistake, heed_cancel
+from gcsplan.mission_file.kept import KeptWorld
 from gcsplan.mission_file.request import MissionFile, VehicleRequest
 from gcsplan.mission_file.scene import LOCAL_MARGIN_M, MARGIN_M, MissionPlace, settle_areas, settle_zones
 from gcsplan.mission_file.terminals import Terminals, make_request
@@ -74,6 +75,7 @@ class MissionPlane:
     terminals: Sequence[Terminals]
     good: Collection[MissionPlace]
     local: bool
+    kept: KeptWorld = field(default_factory=KeptWorld)
     _extent: Box | None = None
     _loaded: WeakValueDictionary[int, MissionFile] = field(default_factory=WeakValueDictionary)
 
@@ -119,13 +121,17 @@ class MissionPlane:
         return wide
 
     def _ground(self, box: Box, most_cells: int | None, problems: list[Mistake], spare_m: float) -> GroundWindow | None:
+        heed_cancel()
         corner_m = max(math.hypot(e, n) for e in (box[0], box[2]) for n in (box[1], box[3]))
         scale = self.frame.scale_at(corner_m + spare_m)
         try:
-            surface = self.terrain.load(self.frame, box, most_cells=most_cells)
+            frame = self.frame
+            made_of = (self.terrain, frame.lat_deg, frame.lon_deg, frame.amsl_m, box, most_cells)
+            surface = self.kept.surface(made_of, partial(self.terrain.load, frame, box, most_cells=most_cells))
         except InputError as why:
             problems += why.problems
             return None
+        heed_cancel()
         try:
             outside = outside_zones(settle_areas(self.areas, surface), local=self.local)
         except InputError as why:

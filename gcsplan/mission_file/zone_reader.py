@@ -5,6 +5,7 @@ Published formats are known likewise: OpenAir by its name, the others by members
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,7 @@ from gcsplan.mission_file.zones.file import OnBad, ZoneFile
 from gcsplan.mission_file.zones.geojson import read_geojson
 from gcsplan.mission_file.zones.kml import read_kml
 from gcsplan.mission_file.zones.plan_fence import read_plan_fence
+from gcsplan.plugins import ZONE_READERS, failing
 from gcsplan.world.terrain.input_files import (
     FENCE_ZONES,
     JSON_ZONES,
@@ -47,23 +49,28 @@ def read_zones(
     layer: str | None = None,
     policy: Policy | None = None,
     keep_in: bool = False,
+    data: bytes | None = None,
 ) -> ZoneFile:
     """The zones of a file in any of the formats; with ``keep_in`` they become areas to stay in, without their holes.
 
     ``where`` is the key that the zones belong to, ``radius_m`` the radius of points and ``buffer_m`` the half-width
     around lines that have none of their own, ``layer`` the only layer to read, and ``policy`` says which published
-    zones are no-fly.
+    zones are no-fly. ``data``: the content of a file that lies on no disk; ``path`` is then its name in messages.
 
     Mistakes in single features are collected in ``problems``; a file that cannot be read at all raises InputError.
     """
     kind = path.suffix.lower()
-    if kind not in (*ZONE_FILES, *FENCE_ZONES, PLAN, *OPENAIR_ZONES):
+    own = (*ZONE_FILES, *FENCE_ZONES, PLAN, *OPENAIR_ZONES)
+    added = None if kind in own else ZONE_READERS.get(kind)
+    if added is None and kind not in own:
         known = f"{', '.join((*ZONE_FILES, *FENCE_ZONES, PLAN))} and OpenAir ({', '.join(OPENAIR_ZONES)}) files"
         raise InputError(f"zones are read from {known}, given {path.name}", where=where)
     if layer is not None and kind not in VECTOR_ZONES:
         raise InputError(f"a {kind} file has no layers; leave `layer` out", where=where)
     policy = policy or Policy()
-    data = _bytes(path, where)
+    data = _bytes(path, where) if data is None else _few(path, len(data), data, where)
+    if added is not None:  # what it makes is read as a file of GeoJSON
+        kind, data = JSON_ZONES[0], geojson_by(added, path, data)
     whole = load_json(path, data) if kind in (*JSON_ZONES, PLAN) else None
     require_wgs84(whole, path, json_format(whole)[0])
     in_part = sent_in_part(whole, path)
@@ -89,6 +96,12 @@ def read_zones(
     return found
 
 
+def geojson_by(read: Callable[[bytes], Any], path: Path, data: bytes) -> bytes:
+    """The GeoJSON that the reader of another package makes of a file. Raises InputError."""
+    with failing(f"{path}: its reader"):
+        return json.dumps(read(data)).encode()
+
+
 def _read(path: Path, kind: str, data: bytes, layer: str | None, whole: Any) -> ZoneFile:
     if kind == PLAN:
         return read_plan_fence(path, whole)
@@ -110,14 +123,18 @@ def _bytes(path: Path, where: str) -> bytes:
     try:
         if not path.is_file():
             raise InputError(absent(path), where=where)
-        size = path.stat().st_size
-        if size > MAX_ZONE_BYTES:
-            raise InputError(f"{path} has {size} bytes, more than {MAX_ZONE_BYTES}; simplify or split it", where=where)
-        return path.read_bytes()
+        return _few(path, path.stat().st_size, None, where)
     except (OSError, ValueError) as why:
         if isinstance(why, InputError):
             raise
         raise InputError(f"{path} cannot be read: {why}", where=where) from None
+
+
+def _few(path: Path, size: int, data: bytes | None, where: str) -> bytes:
+    """``data``, or the bytes of the file; InputError for more than `MAX_ZONE_BYTES`."""
+    if size > MAX_ZONE_BYTES:
+        raise InputError(f"{path} has {size} bytes, more than {MAX_ZONE_BYTES}; simplify or split it", where=where)
+    return path.read_bytes() if data is None else data
 
 
 _JSON_FORMATS = (

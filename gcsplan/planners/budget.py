@@ -15,6 +15,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
+from gcsplan.errors import heed_cancel
+
 RATES = {
     "node": 0.06e-6,
     "portal": 0.07e-6,
@@ -86,7 +88,8 @@ class Budget:
         self.begun_s = self.clock()
 
     def spend(self, what: str, count: float) -> None:
-        """Count ``count`` units of the work ``what``, a key of `RATES`."""
+        """Count ``count`` units of the work ``what``, a key of `RATES`. Raises Cancelled."""
+        heed_cancel()
         self.spent += RATES[what] * count
 
     def found_first(self) -> None:
@@ -115,7 +118,8 @@ class Budget:
         return min(self._first_s + max(self.seconds - SPARE_S, 0.5 * self.seconds), self.until_s)
 
     def goes_on(self) -> bool:
-        """Whether counted work and time are left; records which of them ran out."""
+        """Whether counted work and time are left; records which of them ran out. Raises Cancelled."""
+        heed_cancel()
         if self.left <= 0.0:
             self.ran_out = self.ran_out or self._kept == 0.0
             return False

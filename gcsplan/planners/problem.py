@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from itertools import pairwise
 from types import MappingProxyType
 from typing import Literal
@@ -39,12 +39,17 @@ class Via:
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """A progress report of a plan: seconds since the call, best cost so far, lower bound (either may be None)."""
+    """A progress report of a plan: seconds since the call, best cost so far, lower bound (either may be None).
+
+    ``path``: the best path so far, if it is one from start to goal. Its legs keep the limits; the mission made of it is
+    not judged yet.
+    """
 
     elapsed_s: float
     cost: float | None
     lower_bound: float | None
     phase: str = ""
+    path: Path | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,6 +105,14 @@ class Problem:
     leaving: float = math.inf
     checked: Limits | None = None
     rounding_m: tuple[float, float] = (0.0, 0.0)
+
+    def __repr__(self) -> str:
+        return f"<Problem from {self.start} to {self.goal}, {len(self.via)} vias, {len(self.airspace.zones)} zones>"
+
+    def __getstate__(self) -> list[object]:
+        """Without the caller's function and without what loads more terrain, which are of this process alone."""
+        alone = {"progress": None, "widen": None, "options": dict(self.options)}
+        return [alone.get(f.name, getattr(self, f.name)) for f in fields(self)]
 
     @property
     def bound_limits(self) -> Limits:
@@ -223,6 +236,9 @@ class Solution:
     repaired: bool | None = None
     search: tuple[Step, ...] = ()
     problem: Problem | None = None
+
+    def __repr__(self) -> str:
+        return f"<Solution: {len(self.path.points)} points, bound {self.lower_bound}, stopped by {self.stopped_by}>"
 
 
 PlanFunction = Callable[[Problem], Solution]

@@ -5,17 +5,26 @@ Cheap to import: a package is imported only when one of its planners is named.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import inspect
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
 from types import MappingProxyType
 from typing import cast
 
-from gcsplan.errors import InputError, needs, unknown_name
-from gcsplan.planners.problem import Problem, Solution
+import numpy as np
+
+from gcsplan.errors import InputError, NoMission, needs, unknown_name
+from gcsplan.planners.problem import Problem, Refusal, Solution, passes_vias
+from gcsplan.plugins import PLANNERS, failing, function_at
+from gcsplan.world.geometry.path import Path
 
 VOLUME_KEYS = ("west_m", "south_m", "bottom_m", "east_m", "north_m", "top_m")
 """Keys of a swarm's ``parameters`` for the six sides of the flight volume, metres in the plane and metres AMSL."""
+
+
+ENDS_OFF_M = 1e-6
+"""Metres by which the ends of a path may lie beside the ends of its problem."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +51,43 @@ class PlannerEntry:
         return False
 
 
+@dataclass(frozen=True, slots=True)
+class AddedEntry(PlannerEntry):
+    """A planner of another package, or a function of a script: its path is looked at, its claims are not taken over."""
+
+    function: Callable[[Problem], Solution] | None = None
+
+    def plan(self, problem: Problem) -> Solution:
+        """As `PlannerEntry.plan`; raises InputError for a result that is no path of the problem."""
+        assert self.function is not None
+        with failing(f"planner {self.name}"):
+            try:
+                found = self.function(problem)
+            except NoMission as why:
+                if why.reason != "infeasible":
+                    raise
+                raise Refusal(f"{why.message} (as {self.name} says; nothing proves it)", reason="not_found") from why
+        return _looked_at(found, problem, f"planner {self.name}")
+
+
+def _looked_at(found: object, problem: Problem, where: str) -> Solution:
+    """A stranger's solution as a path alone. Raises InputError."""
+    if not isinstance(found, Solution):
+        raise InputError(f"a planner returns a Solution, given {type(found).__name__}", where=where)
+    points = np.asarray(getattr(found.path, "points", None), dtype=object)
+    try:
+        points = points.astype(np.float64)
+    except (TypeError, ValueError):
+        points = np.empty(0)
+    if points.ndim != 2 or points.shape[1] != 3 or len(points) < 2 or not np.isfinite(points).all():
+        raise InputError("a path is an array (N, 3) of finite east_m, north_m, amsl_m", where=where)
+    off_m = np.abs(points[[0, -1]] - np.array([problem.start, problem.goal])).max()
+    if off_m > ENDS_OFF_M or not passes_vias(problem, points):
+        words = f"by {off_m:.3f} m at an end" if off_m > ENDS_OFF_M else "a via is not passed"
+        raise InputError(f"a path leads from problem.start by problem.via to problem.goal: {words}", where=where)
+    return Solution(Path(points), planning_s=float(found.planning_s), first_path_s=float(found.first_path_s))
+
+
 _SWARM_NAMES = (
     "krill", "aco", "abc", "b-abc", "ib-abc", "gwo", "mgwo", "igwo", "sogwo", "ssgwo", "foa", "mfoa", "iffo", "msfoa",
     "pso", "de", "lshade", "cmaes", "po", "abo",
@@ -54,25 +100,39 @@ PLANNER_PACKAGES: Mapping[str, str] = MappingProxyType(
 
 
 def names() -> tuple[str, ...]:
-    """Every planner's name, the default one first."""
-    return tuple(PLANNER_PACKAGES)
+    """Every planner's name, the default one first, planners of other packages last."""
+    return (*PLANNER_PACKAGES, *(name for name in PLANNERS.names() if name not in PLANNER_PACKAGES))
 
 
 def get(name: str) -> PlannerEntry:
     """The planner called ``name``.
 
-    Raises InputError if there is none, with the nearest known name, or if its package is not installed.
+    It may be ``MODULE:FUNCTION``, too, but not in a mission file. Raises InputError if there is none, with the nearest
+    known name, or if its package is not installed.
     """
     if name not in PLANNER_PACKAGES:
-        raise unknown_name(f"there is no planner {name!r}", name, PLANNER_PACKAGES)
+        added = function_at(name, "planner") if ":" in name else PLANNERS.get(name)
+        if added is not None:
+            return own(added, name)
+        raise unknown_name(f"there is no planner {name!r}", name, names())
     with needs(PLANNER_PACKAGES[name], f"the planner {name!r}"):
         return cast(PlannerEntry, import_module(PLANNER_PACKAGES[name]).entry(name))
 
 
+def own(function: Callable[[Problem], Solution], name: str = "") -> AddedEntry:
+    """The row of a function that plans."""
+    words = (inspect.getdoc(function) or "").partition("\n")[0]
+    module = getattr(function, "__module__", "")
+    return AddedEntry(
+        name or getattr(function, "__qualname__", type(function).__name__), words, module, function=function
+    )
+
+
 def rows() -> Iterator[PlannerEntry]:
     """All planners, the default one first; the summary of a planner whose package is not installed names that."""
-    for name, package in PLANNER_PACKAGES.items():
+    for name in names():
         try:
             yield get(name)
-        except InputError:
-            yield PlannerEntry(name, f"not installed: it needs {package}", package)
+        except InputError as why:
+            package = PLANNER_PACKAGES.get(name, "")
+            yield PlannerEntry(name, f"not installed: it needs {package}" if package else why.message, package)

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -171,6 +171,10 @@ class LegReport:
     violations: tuple[Violation, ...]
 
 
+def _remade(surface: Surface, zones: Sequence[Zone], scale: float) -> Airspace:
+    return Airspace(surface, zones, scale=scale)
+
+
 class Airspace:
     """A surface and its zones, with the functions that judge legs.
 
@@ -185,6 +189,7 @@ class Airspace:
             raise ValueError(f"scale must be 1 or a little more, given {scale:g}")
         self.surface = surface
         self.scale = scale
+        self._given = tuple(zones)
         self.field = Field.of(surface.grid)
         self.zone_table = ZoneTable.of(over_both_grounds(zones, surface, self.field, scale), surface, self.field, scale)
         self.zones = self.zone_table.zones
@@ -195,6 +200,12 @@ class Airspace:
         self.grounds = Held(SURFACE, self.field.packed, ground, ground)
         self._tops, self._bare = (Held(ONE_SURFACE, self.field.packed, z) for z in (top, ground))
         self._held_zones = Held(ZONES, *self.zone_table.arrays)
+
+    def __reduce__(self) -> tuple[Callable[..., Airspace], tuple[Surface, tuple[Zone, ...], float]]:
+        return _remade, (self.surface, self._given, self.scale)
+
+    def __repr__(self) -> str:
+        return f"<Airspace: {self.surface!r}, {len(self.zones)} zones>"
 
     def examine(self, legs: Legs, limits: Limits) -> LegReport:
         """Every violation along the whole of every leg. ``limits``' own errors are not used: the legs carry them."""

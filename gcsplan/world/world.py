@@ -27,6 +27,9 @@ class World:
     airspace: Airspace
     post_spacing_m: int = SPACING_M
 
+    def __reduce__(self) -> tuple[type[World], tuple[Frame, Airspace, int]]:
+        return World, (self.frame, self.airspace, self.post_spacing_m)  # without the answers that are kept
+
     def spread_m(self, lat_deg: float, lon_deg: float) -> float:
         """How far the greatest ground at a place lies above the least one, m; 0 where they are one or unknown."""
         surface = self.airspace.surface

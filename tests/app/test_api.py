@@ -5,6 +5,8 @@ from __future__ import annotations
 import dataclasses
 import doctest
 import inspect
+import json
+import pickle
 import re
 import runpy
 import subprocess
@@ -20,6 +22,7 @@ from typer import testing as runner
 
 import gcsplan
 from gcsplan.app import api as scripting
+from gcsplan.app import session
 from gcsplan.app.api import rehearse, upload, write
 from gcsplan.app.fleet import pipeline
 from gcsplan.app.fleet.pipeline import plan
@@ -75,11 +78,15 @@ def run(code: str) -> str:
     return done.stdout.strip()
 
 
-NAMES = ["check", "load_mission", "plan", "rehearse", "report", "upload", "write"]
+NAMES = [
+    "check", "clear", "download", "fetch_dem", "load_mission", "new", "plan", "register_optimiser", "register_output",
+    "register_planner", "register_zone_reader", "rehearse", "report", "upload", "verify", "write",
+]  # fmt: skip
 
 
 def test_the_functions_are_at_the_front_door_and_cost_nothing_until_used() -> None:
-    assert dir(gcsplan) == sorted(["__version__", *NAMES])
+    assert dir(gcsplan) == sorted(gcsplan.__all__)
+    assert all(inspect.isclass(getattr(gcsplan, name)) for name in gcsplan.__all__ if name[0].isupper())
     for name in NAMES:
         assert inspect.isfunction(getattr(gcsplan, name))
         assert getattr(gcsplan, name).__doc__
@@ -95,7 +102,8 @@ def test_the_functions_are_at_the_front_door_and_cost_nothing_until_used() -> No
 
 def test_help_shows_every_function_with_its_arguments() -> None:
     text = run("import pydoc, gcsplan; print(pydoc.render_doc(gcsplan, renderer=pydoc.plaintext))")
-    shown = [line.split("(")[0] for line in text.split("FUNCTIONS")[1].splitlines() if re.match(r"    [a-z_]+\(", line)]
+    functions = text.split("\nFUNCTIONS")[1]
+    shown = [line.split("(")[0] for line in functions.splitlines() if re.match(r"    [a-z_]+\(", line)]
     assert [name.strip() for name in shown] == NAMES
 
 
@@ -110,7 +118,7 @@ def test_check_and_report_are_functions_whatever_was_imported_before(first: str)
     assert run(code + "; print(check.__module__, gcsplan.report is report)") == "gcsplan.app.api True"
 
 
-@pytest.mark.parametrize("module", [load, pipeline, scripting], ids=lambda m: m.__name__)
+@pytest.mark.parametrize("module", [load, pipeline, scripting, session], ids=lambda m: m.__name__)
 def test_the_examples_in_the_docstrings_run(module: ModuleType) -> None:
     found = doctest.testmod(module)
     assert found.attempted > 1
@@ -151,10 +159,10 @@ def test_what_is_wrong_with_a_mission_is_told_with_its_place(source: Any, text: 
 
 def test_what_is_no_mission_at_all_is_a_mistake_of_the_script() -> None:
     for given in ((), (7,)):
-        with pytest.raises(TypeError, match="takes a path, the text of a mission file, or a mapping"):
+        with pytest.raises(UsageError, match="takes a path, the text of a mission file, or a mapping"):
             load_mission(*given)
     for source in ("a: 1\n", {"a": 1}):
-        with pytest.raises(TypeError, match="load_mission takes"):
+        with pytest.raises(UsageError, match="load_mission takes"):
             load_mission(source, text="b: 1\n")
 
 
@@ -299,3 +307,71 @@ def test_the_example_uploads_a_fleet(cross: Plan, tmp_path: Path, capsys: pytest
         assert main(str(file), server.url_for_gcs) == 5
         assert "withdrawn" in capsys.readouterr().out
     assert main(str(tmp_path / "none.yaml"), "sim") == 2
+
+
+def test_a_plan_survives_pickling_and_gives_the_same_bytes(cross: Plan, tmp_path: Path) -> None:
+    again = pickle.loads(pickle.dumps(cross))
+    assert {name: v.safe for name, v in gcsplan.check(again).items()} == {v.name: True for v in cross.vehicles}
+    for folder, planned in (("here", cross), ("there", again)):
+        write(planned, tmp_path / folder, report=True)
+    for file in (tmp_path / "here").iterdir():
+        assert file.read_bytes() == (tmp_path / "there" / file.name).read_bytes(), file.name
+    assert not again.world.airspace.surface.ground_m.flags.writeable
+
+
+def test_every_result_says_in_one_line_what_it_is(cross: Plan) -> None:
+    (one, *_), world = cross.vehicles, cross.world
+    shown = [cross, one, cross.source, cross.fleet, one.verdict, one.mission, one.solution, one.problem, one.brief]
+    for result in (*shown, world.airspace, world.airspace.surface):
+        assert "\n" not in repr(result)
+        assert len(repr(result)) < 300, repr(result)[:300]
+
+
+def test_a_plans_documents_are_those_of_its_files(cross: Plan, tmp_path: Path) -> None:
+    write(cross, tmp_path)
+    summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
+    document = json.loads(json.dumps(cross.to_dict()))
+    assert {key: document[key] for key in ("schema", "inputs", "fleet")} == {
+        key: summary[key] for key in ("schema", "inputs", "fleet")
+    }
+    assert cross.to_geojson() == json.loads((tmp_path / "mission.geojson").read_text(encoding="utf-8"))
+
+
+def test_a_mission_on_board_is_verified_downloaded_and_cleared(cross: Plan, tmp_path: Path) -> None:
+    one = cross.vehicles[0]
+    write(cross, tmp_path)
+    with SimServer(boards(cross), "udpin:127.0.0.1:0", speedup=10.0) as server:
+        url = server.url_for_gcs
+        (sent,) = upload(cross, to={one.name: url})
+        assert sent.verified
+        sysid = one.mission.sysid
+        assert gcsplan.verify(tmp_path / f"{one.name}.plan", url, sysid=sysid).verified
+        read = gcsplan.download(url, sysid=sysid)
+        assert [(i.command, i.x, i.y) for i in read.items] == [(i.command, i.x, i.y) for i in one.mission.items]
+        assert gcsplan.check(read, cross, vehicle=one.name).safe
+        assert gcsplan.download(url, tmp_path / "read.plan", sysid=sysid).items == read.items
+        gcsplan.clear(url, sysid=sysid)
+        assert not gcsplan.verify(tmp_path / f"{one.name}.plan", url, sysid=sysid).verified
+    with pytest.raises(UsageError, match="mission, fence or rally"):
+        gcsplan.clear("udp:127.0.0.1:1", "everything")
+
+
+def test_a_new_mission_is_written_once_and_says_what_is_wrong(tmp_path: Path) -> None:
+    file = tmp_path / "m.yaml"
+    text = gcsplan.new("36.6, -84.3", "36.61, -84.3", flat_m=300.0, file=file)
+    assert file.read_text(encoding="utf-8") == text
+    for words, given in (
+        ("is there already", {"flat_m": 300.0, "file": file}), ("give one of them", {}),
+        ("autopilot is one of", {"flat_m": 1.0, "autopilot": "x"}), ("dem: ", {"dem": "no.tif"}),
+    ):  # fmt: skip
+        with pytest.raises(InputError, match=words):
+            gcsplan.new("36.6, -84.3", "36.61, -84.3", **given)
+    with pytest.raises(UsageError, match="start is a place"):
+        gcsplan.new((36.6, -84.3), "x", flat_m=1.0)  # type: ignore[arg-type]
+
+
+def test_terrain_that_is_not_named_is_not_fetched() -> None:
+    with pytest.raises(UsageError, match="which area"):
+        gcsplan.fetch_dem()
+    with pytest.raises(UsageError, match="names such as N36W085"):
+        gcsplan.fetch_dem(tiles="X", offline=True)

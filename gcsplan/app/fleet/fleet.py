@@ -24,7 +24,7 @@ from gcsplan.arrays import Floats
 from gcsplan.check.flight.times import over_ground, pace_over_ground
 from gcsplan.check.motion.circles import PLANE_LOITER_RADIUS_M, circle_growth
 from gcsplan.check.verdict import LegFigures
-from gcsplan.errors import NoMission
+from gcsplan.errors import NoMission, heed_cancel
 from gcsplan.fleet.arrival import Craft, Crew, NoSchedule, Schedule, Slot, schedule
 from gcsplan.fleet.motion.timing import Course, Route, TimedPath, motion_error_m
 from gcsplan.mission_file import ArrivalRequest
@@ -172,6 +172,7 @@ def without(fleet: FleetPlan, kept: Sequence[VehiclePlan], arrival: ArrivalReque
 def _separation(
     motions: Sequence[TimedPath], flown: Sequence[VehiclePlan], arrival: ArrivalRequest | None
 ) -> Separation | None:
+    heed_cancel()
     if len(flown) < 2:
         return None
     from gcsplan.fleet.separation import separation  # imported here because most plans have one vehicle
@@ -208,6 +209,7 @@ def _timed(
 
 def crew_of(v: VehiclePlan, world: World) -> Crew:
     """A vehicle and its route, in the form that the fleet package takes."""
+    heed_cancel()
     return Crew(v.request.vehicle, route_of(v, world))
 
 
@@ -329,6 +331,7 @@ def _kept_apart(
 
 def motion_of(v: VehiclePlan, slot: Slot, world: World) -> TimedPath:
     """The motion of the mission as built. Its items contain the hold already, unless a time of day ends it."""
+    heed_cancel()
     course = Course(route_of(v, world), v.request.vehicle)
     return course.fly(slot.speed_m_s, slot.depart_s, slot.hold_s if v.order.gate_utc else 0.0)
 

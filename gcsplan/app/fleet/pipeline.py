@@ -22,9 +22,10 @@ from gcsplan.app.plan.left_out import LeavingOut
 from gcsplan.app.plan.model import Brief, Plan, PlanOptions, VehiclePlan
 from gcsplan.errors import InputError, NoMission, unknown_name
 from gcsplan.mission_file import MissionFile, load_mission
-from gcsplan.planners.problem import Progress
-from gcsplan.planners.registry import VOLUME_KEYS
+from gcsplan.planners.problem import Problem, Progress, Solution
+from gcsplan.planners.registry import VOLUME_KEYS, AddedEntry
 from gcsplan.planners.registry import get as get_planner
+from gcsplan.planners.registry import own as own_planner
 
 __all__ = ["load_mission", "plan", "world_of"]
 
@@ -32,7 +33,7 @@ __all__ = ["load_mission", "plan", "world_of"]
 def plan(  # noqa: PLR0913 - options by name, each with a default
     source: MissionFile | str | PathLike[str] | Mapping[str, Any],
     *,
-    planner: str | None = None,
+    planner: str | Callable[[Problem], Solution] | None = None,
     objective: str | None = None,
     seed: int | None = None,
     options: Mapping[str, object] | None = None,
@@ -47,8 +48,10 @@ def plan(  # noqa: PLR0913 - options by name, each with a default
 
     ``source`` is a mission of `load_mission`, or anything that `load_mission` accepts. ``planner``, ``objective``
     (``length`` in metres or ``energy`` in joules), ``seed`` and ``options`` (keys of single planners, such as a swarm's
-    ``encoding``) override the file's. ``gate_utc`` is the common start as a time of day; every ArduCopter then waits in
-    the air until its own second. ``progress(vehicle, progress)`` is called from time to time.
+    ``encoding``) override the file's. ``planner`` may also be a function that gets a `Problem` and returns a
+    `Solution`: its path is judged like any other, and its vehicles are planned in this process. ``gate_utc`` is the
+    common start as a time of day; every ArduCopter then waits in the air until its own second. ``progress(vehicle,
+    progress)`` is called from time to time.
 
     ``jobs`` processes of this machine plan the vehicles (None: one for each core), or the workers of ``cluster``, the
     address of a dask scheduler or a ``distributed.Client``; the plan is the same to the byte. A few vehicles are
@@ -97,8 +100,9 @@ def plan(  # noqa: PLR0913 - options by name, each with a default
 
 def _brief_of(source: MissionFile, given: PlanOptions) -> Brief:
     """The terms on which all vehicles of a mission are planned; the ``given`` options override the file's keys."""
-    name = given.planner or source.planner.name
-    entry = get_planner(name)
+    own = given.planner if callable(given.planner) else None
+    entry = get_planner(given.planner or source.planner.name) if own is None else own_planner(own)  # type: ignore[arg-type]
+    name = entry.name
     goal = given.objective or source.planner.objective
     if goal not in ("length", "energy"):
         raise InputError(f"objective must be length or energy, given {goal!r}")
@@ -107,8 +111,9 @@ def _brief_of(source: MissionFile, given: PlanOptions) -> Brief:
         _require_warm_start(source, merged)
     number = source.planner.seed if given.seed is None else given.seed
     return Brief(
-        source, world_of(source), name, goal, number, merged, len(source.vehicles) > 1 and entry.by_priority(merged)
-    )
+        source, world_of(source), name, goal, number, merged, len(source.vehicles) > 1 and entry.by_priority(merged),
+        own,
+    )  # fmt: skip
 
 
 def _planned(
@@ -116,8 +121,10 @@ def _planned(
     leaving: LeavingOut,
 ) -> list[VehiclePlan]:  # fmt: skip
     """Every vehicle's own plan, in this process or by workers. By priority, or to begin around another vehicle's path,
-    each vehicle needs the plans before its own."""
-    if brief.by_priority or _leader(brief) is not None:
+    each vehicle needs the plans before its own;
+    a planner that was added may be known in this process alone."""
+    here = isinstance(get_planner(brief.planner), AddedEntry) if brief.own is None else True
+    if here or brief.by_priority or _leader(brief) is not None:
         return _one_by_one(brief, progress, leaving)
     count = len(brief.source.vehicles)
     begun_s = time.perf_counter()

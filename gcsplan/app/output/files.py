@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import io
+import json
 import math
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from types import MappingProxyType
@@ -18,11 +20,13 @@ from gcsplan.app.upload.on_board import settings_of_plan
 from gcsplan.arrays import Floats
 from gcsplan.check.returns.words import verdict_words
 from gcsplan.check.verdict import LegFigures, Verdict
+from gcsplan.errors import InputError
 from gcsplan.export.geojson import write_geojson
 from gcsplan.export.kml import write_kml
+from gcsplan.export.outdir import is_output
 from gcsplan.export.profile import write_profile
 from gcsplan.export.rows import FlownTrack, ItemRow, WayPoint
-from gcsplan.export.summary import write_summary
+from gcsplan.export.summary import document, write_summary
 from gcsplan.figures import floored, raised
 from gcsplan.fleet.arrival import Slot
 from gcsplan.mavlink.files.formats import write_plan, write_waypoints
@@ -30,6 +34,7 @@ from gcsplan.mavlink.mission.commands import command_name
 from gcsplan.mavlink.mission.mission import MissionItem
 from gcsplan.mavlink.mission.parameter_file import PARAM_ENDING, param_file
 from gcsplan.notes.note import in_json
+from gcsplan.plugins import OUTPUTS, failing
 from gcsplan.units import METRIC, Units
 
 if TYPE_CHECKING:
@@ -53,8 +58,7 @@ def outputs_of(
     ``homes``: vehicle name to its way home if that was judged; the summary then contains it. ``fences``: vehicle name
     to its fence items, for the `.plan`. With ``rally``, the `.plan` also contains the proposed rally points.
     """
-    slots = {s.name: s for s in plan.fleet.slots} if plan.fleet is not None else {}
-    tracks = [_track(v, plan.source.geoid, slots.get(v.name), homes.get(v.name)) for v in plan.vehicles]
+    slots, tracks = _slots(plan), _tracks(plan, homes)
     frame, zones = plan.world.frame, plan.world.airspace.zones
     files = {}
     for v in plan.vehicles:
@@ -74,7 +78,59 @@ def outputs_of(
         [row for v in plan.vehicles for row in item_rows(v.name, v.verdict, slots.get(v.name))]
     )
     files["summary.json"] = write_summary(summary_of(plan, homes=homes))
+    return files | _added(plan, files)
+
+
+def _added(plan: Plan, own: Mapping[str, str]) -> dict[str, str]:
+    """The files of other packages. Raises InputError for one that cannot stand beside gcsplan's ``own``."""
+    files: dict[str, str] = {}
+    for name in OUTPUTS.names():
+        where, write = f"output {name}", OUTPUTS.get(name)
+        assert write is not None
+        with failing(where):
+            found = dict(write(plan))
+        for file, text in found.items():
+            if not isinstance(file, str) or not isinstance(text, str):
+                raise InputError("an output is a mapping from file names to texts", where=where)
+            if (
+                file != os.path.basename(file)
+                or file.startswith(".")
+                or is_output(file)
+                or file in own
+                or file in files
+            ):
+                raise InputError(f"{file[:80]!r} is no free name for a file of its own in the folder", where=where)
+            files[file] = text
     return files
+
+
+def _slots(plan: Plan) -> dict[str, Slot]:
+    return {s.name: s for s in plan.fleet.slots} if plan.fleet is not None else {}
+
+
+def _tracks(plan: Plan, homes: Homes) -> list[FlownTrack]:
+    slots = _slots(plan)
+    return [_track(v, plan.source.geoid, slots.get(v.name), homes.get(v.name)) for v in plan.vehicles]
+
+
+def document_of(plan: Plan) -> dict[str, Any]:
+    """The document of ``plan --json`` as plain values."""
+    return document(summary_of(plan), clocks=True)
+
+
+def geojson_of(plan: Plan) -> dict[str, Any]:
+    """``mission.geojson`` as plain values."""
+    zones, frame = plan.world.airspace.zones, plan.world.frame
+    whole: dict[str, Any] = json.loads(write_geojson(plan.source.name, _tracks(plan, {}), zones, frame))
+    return whole
+
+
+def sketch_of(plan: Plan) -> str:
+    """Map and table as a fragment of HTML without scripts and styles."""
+    from gcsplan.app.output.report import page_of_plan
+    from gcsplan.report.views.sketch import sketch_html
+
+    return sketch_html(page_of_plan(plan), [str(verdict_words(v.verdict.safe, None)) for v in plan.vehicles])
 
 
 def _rally_items(home: WayHome) -> tuple[MissionItem, ...]:
@@ -101,13 +157,13 @@ def figures_of(plan: Plan) -> dict[str, bytes]:
     return picture.figures(page_of_plan(plan))
 
 
-def picture_of(plan: Plan) -> bytes:
-    """Map and profiles in one PNG."""
+def picture_of(plan: Plan, form: str = "png") -> bytes:
+    """Map and profiles in one picture; ``form``: png, svg or pdf."""
     from gcsplan.app.output.report import page_of_plan
     from gcsplan.report.views import picture
 
     buffer = io.BytesIO()
-    picture.save(page_of_plan(plan), buffer)
+    picture.save(page_of_plan(plan), buffer, form)
     return buffer.getvalue()
 
 

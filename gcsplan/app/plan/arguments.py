@@ -14,12 +14,14 @@ from gcsplan.errors import UsageError
 __all__ = ["require"]
 
 EXPECTED: dict[str, tuple[Any, str]] = {
-    "planner": (str, "the name of a planner (`gcsplan planners` lists them; docs/extending.md says how to add one)"),
+    "planner": ((str, Callable), "the name of a planner (`gcsplan planners` lists them), or a function that plans"),
     "objective": (str, "'length' or 'energy'"),
     "seed": (Integral, "a whole number"),
     "options": (Mapping, "a mapping of a planner's keys"),
     "gate_utc": (datetime, "a datetime"),
     "progress": (Callable, "a function"),
+    "on_path": (Callable, "a function"),
+    "on_bound": (Callable, "a function"),
     "jobs": (Integral, "a number of processes"),
     "leave_out": (bool, "True or False"),
     "planned": (Plan, "a plan, as gcsplan.plan returns it"),
@@ -34,10 +36,23 @@ EXPECTED: dict[str, tuple[Any, str]] = {
     "from_deg": (Real, "a number"),
     "timeout_s": (Real, "a number of seconds"),
     "to": ((str, list, tuple, Mapping), "a URL, a list of NAME=URL, or a mapping from name to URL"),
+    "url": (str, "a URL"),
+    "sysid": (Integral, "the number of a vehicle, 1 to 255"),
+    "tolerance_m": (Real, "a number"),
+    "radius_km": (Real, "a number"),
+    "around": (str, "a place, such as '36.6, -84.38'"),
+    "tiles": (str, "names of tiles with commas, such as 'N36W085,N36W084'"),
+    "source": (str, "the name of a published source"),
+    "start": (str, "a place, such as '36.6, -84.38'"),
+    "goal": (str, "a place, such as '36.6, -84.38'"),
+    "flat_m": (Real, "a number"),
+    "min_agl_m": (Real, "a number"),
+    "kind": (str, "'mission', 'fence' or 'rally'"),
 }
 """The type of each argument by its name, and what it is in words."""
 
-NEEDED = {"planned", "folder", "what", "runs", "wind_m_s", "gusts_m_s", "noise_m", "timeout_s", "to"}
+NEEDED = {"planned", "folder", "what", "runs", "wind_m_s", "gusts_m_s", "noise_m", "timeout_s", "to", "url", "sysid",
+          "start", "goal", "min_agl_m", "kind"}  # fmt: skip
 """Arguments that cannot be None."""
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
-from typing import TYPE_CHECKING
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, cast
 
 from gcsplan.app.plan.left_out import LeftOut
 from gcsplan.check.verdict import Verdict
@@ -18,11 +19,18 @@ from gcsplan.mission_file import MissionFile, VehicleRequest
 from gcsplan.notes.note import Note
 from gcsplan.planners.problem import Problem, Solution
 from gcsplan.planners.registry import get as get_planner
+from gcsplan.planners.registry import own as own_planner
 from gcsplan.world.world import World
 
 if TYPE_CHECKING:
     from gcsplan.fleet.separation import Encounter, Separation
 
+
+OUTPUTS = "gcsplan.app.output.files"
+"""The module that makes documents of a plan, named as the table of planners names theirs: it is imported at need."""
+
+MOST_VEHICLES_SHOWN = 4
+"""Most vehicles that a plan's ``repr`` names."""
 
 TOUCH_M, TOUCH = 1e-3, 1e-7
 """Metres, and part of the bound, by which rounding may put the cost of a plan below its bound."""
@@ -36,7 +44,7 @@ class PlanOptions:
     out.
     """
 
-    planner: str | None = None
+    planner: str | Callable[[Problem], Solution] | None = None
     objective: str | None = None
     seed: int | None = None
     options: Mapping[str, object] = field(default_factory=dict)
@@ -48,7 +56,8 @@ class PlanOptions:
 class Brief:
     """How all vehicles of a mission file are planned: by which planner, with ``options`` that only it knows.
 
-    ``by_priority``: each vehicle is planned with knowledge of those before it, and gives way to them.
+    ``by_priority``: each vehicle is planned with knowledge of those before it, and gives way to them. ``own``: the
+    planner, if it is a script's function.
     """
 
     source: MissionFile
@@ -58,11 +67,19 @@ class Brief:
     seed: int
     options: Mapping[str, object]
     by_priority: bool = False
+    own: Callable[[Problem], Solution] | None = None
+
+    def __repr__(self) -> str:
+        return f"<Brief: {self.planner}, {self.objective}, seed {self.seed}>"
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without a script's function, which another process may not have."""
+        return {**self.__dict__, "own": None}
 
     @property
     def run(self) -> Callable[[Problem], Solution]:
         """The planner."""
-        return get_planner(self.planner).plan
+        return get_planner(self.planner).plan if self.own is None else own_planner(self.own).plan
 
     def packed(self) -> Brief:
         """The brief without mission and world, for another process, which has read both: `over` puts them in again."""
@@ -98,6 +115,10 @@ class VehiclePlan:
                 f"{self.name}: a bug of gcsplan: the plan costs {self.cost:.3f}, less than its own lower bound of "
                 f"{bound:.3f}; nothing is written"
             )
+
+    def __repr__(self) -> str:
+        gap = "no bound" if self.gap_percent is None else f"gap {self.gap_percent:.2f} %"
+        return f"<VehiclePlan {self.name!r}: {self.verdict.length_m:.0f} m, {gap}, {self.verdict.word}>"
 
     @property
     def name(self) -> str:
@@ -147,6 +168,9 @@ class FleetPlan:
     notes: tuple[Note, ...] = ()
     start_utc: datetime | None = None
 
+    def __repr__(self) -> str:
+        return f"<FleetPlan {self.mode}: {len(self.slots)} vehicles>"
+
     def slot(self, name: str) -> Slot:
         """The slot of a vehicle."""
         return next(s for s in self.slots if s.name == name)
@@ -178,3 +202,23 @@ class Plan:
     fleet: FleetPlan | None = None
     left_out: tuple[LeftOut, ...] = ()
     leaves_out: bool = False
+
+    def __repr__(self) -> str:
+        shown, more = self.vehicles[:MOST_VEHICLES_SHOWN], len(self.vehicles) - MOST_VEHICLES_SHOWN
+        found = [f"{v.name} {v.verdict.length_m:.0f} m {v.verdict.word}" for v in shown]
+        return f"<Plan {self.source.name!r}: {', '.join([*found, *([f'{more} more'] if more > 0 else [])])}>"
+
+    def to_dict(self) -> dict[str, Any]:
+        """The document of ``plan --json``, as plain values that `json` takes; the contract describes its keys."""
+        return cast(dict[str, Any], import_module(OUTPUTS).document_of(self))
+
+    def to_geojson(self) -> dict[str, Any]:
+        """Tracks, way points and zones: the FeatureCollection of ``mission.geojson``, as plain values.
+
+        Positions are longitude and latitude in degrees, and altitude in metres above mean sea level.
+        """
+        return cast(dict[str, Any], import_module(OUTPUTS).geojson_of(self))
+
+    def _repr_html_(self) -> str:
+        """Map and table for a notebook, or for a web page: no script, no style, nothing from elsewhere."""
+        return cast(str, import_module(OUTPUTS).sketch_of(self))

@@ -11,7 +11,7 @@ from gcsplan.app.plan.model import Brief
 from gcsplan.check.judge import judge
 from gcsplan.check.motion.project import why_unknown
 from gcsplan.check.verdict import Verdict
-from gcsplan.errors import InputError, NoMission
+from gcsplan.errors import InputError, NoMission, heed_cancel
 from gcsplan.mavlink.build.multirotor import build_mission, corner_m, cuts_corners
 from gcsplan.mavlink.build.order import FLOWN_SLOPE, LEG_BOW_M, LONGEST_LEG_M, MARGINS, Margins, Order, slope_margin
 from gcsplan.mavlink.mission import commands as cmd
@@ -85,6 +85,7 @@ def looked_over(brief: Brief, solution: Solution) -> Brief:
 
 
 def built(brief: Brief, request: VehicleRequest, solution: Solution, order: Order) -> tuple[Mission, Verdict]:
+    heed_cancel()
     vehicle, source = request.vehicle, brief.source
     mission = build_mission(solution.path, brief.world, vehicle, request.start_deg, order)
     _require_room(mission, vehicle)
@@ -153,6 +154,7 @@ def make_problem(
     The altitudes of start and goal are whole centimetres above home. If ``takeoff_agl_m`` meets min AGL plus altitude
     error but not the ground's slope within the track error, it is raised, with a note; a lower value is bad input.
     """
+    heed_cancel()
     vehicle = request.vehicle
     _require_one_height(source, request, world)
     given, margins = margins, replace(margins, bow_m=bow_margin_m(request, world, margins))

@@ -491,22 +491,27 @@ def verify_file(
     return replace(done, message=done.message + cure if done.message else "", warnings=warnings)
 
 
-def download_to(url: str, sysid: int, file: Path, *, timeout_s: float = 60.0) -> int:
-    """Write the mission on board to a `.waypoints` or `.plan` file; returns the number of its wire items."""
+def download_to(url: str, sysid: int, file: Path, *, timeout_s: float = 60.0) -> Mission:
+    """Write the mission on board to a `.waypoints` or `.plan` file; returns it, too."""
     if file.suffix.lower() not in (".waypoints", ".plan"):
         raise UsageError(f"-o {file}: give a name that ends in .waypoints or .plan")
     if file.is_dir() or not file.parent.is_dir():
         raise UsageError(f"-o {file}: give a file in a directory that exists")
+    mission = mission_on_board(url, sysid, file.stem, timeout_s=timeout_s)
+    text = write_plan(mission) if file.suffix.lower() == ".plan" else write_waypoints(mission)
+    write_whole(file, text)
+    return mission
+
+
+def mission_on_board(url: str, sysid: int, name: str, *, timeout_s: float = 60.0) -> Mission:
+    """The mission on board, with ``name``; nothing is written to the vehicle."""
     from gcsplan.mavlink.link.session import session
 
     with open_link(url) as link:
         autopilot = _autopilot_of(link, sysid)
-        mission = session.download_mission(
-            link, sysid, autopilot, name=file.stem, options=session.SessionOptions(listen_s=0.0, timeout_s=timeout_s)
+        return session.download_mission(
+            link, sysid, autopilot, name=name, options=session.SessionOptions(listen_s=0.0, timeout_s=timeout_s)
         )
-    text = write_plan(mission) if file.suffix.lower() == ".plan" else write_waypoints(mission)
-    write_whole(file, text)
-    return len(mission.wire_items())
 
 
 def on_board(source: MissionFile, where: Mapping[str, str], *, timeout_s: float = 60.0) -> dict[str, Mission]:

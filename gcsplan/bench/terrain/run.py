@@ -74,13 +74,15 @@ def run(  # noqa: PLR0913 - options by name, each with a default
     planner: str = "optimal",
     gap_percent: float = GAP_PERCENT,
     without: Sequence[str] = (),
+    methods: Sequence[str] = (),
     tell: Callable[[str], None] = lambda words: None,
 ) -> TerrainResult:
     """Measure and write the report to ``directory``; ``tell`` receives messages on the progress.
 
     ``seconds`` are the times of OMPL's planners. ``long`` runs gcsplan's again with a minute per problem. ``errors``
     uses the clearance and errors of a real mission. ``count`` is the number of problems of each group. ``gap_percent``
-    is the certified gap at which gcsplan's may stop, ``without`` are searches that it must not use. The rivals' answers
+    is the certified gap at which gcsplan's may stop, ``without`` are searches that it must not use. ``methods`` are
+    planners of others by name or ``MODULE:FUNCTION``, run in this process on every problem. The rivals' answers
     are kept in ``directory`` and not computed again; with ``kept_only`` no others are computed. However the run ends,
     all results so far are written. Raises InputError for unknown kinds and if a rival is not installed.
     """
@@ -95,6 +97,9 @@ def run(  # noqa: PLR0913 - options by name, each with a default
     if rivals and not kept_only:
         others.require(compared_with)
     require_names(without)
+    named_planners = [(OUR_METHOD, planner), *((method, method) for method in methods)]
+    for _, name in named_planners:
+        get_planner(name)  # find a mistake before the long run
     options = {"without": tuple(without)} if without else {}
     result = TerrainResult()
     redraws: list[tuple[int, int]] = []
@@ -117,8 +122,9 @@ def run(  # noqa: PLR0913 - options by name, each with a default
             tell(f"{kind}: warming up")
             warm_s += warm_up(named, planner)
             for one in named:
-                tell(f"{OUR_METHOD}: {one.name}")
-                result.outcomes.append(measure(one, sweep, runs=runs, planner=planner))
+                for method, name in named_planners:
+                    tell(f"{method}: {one.name}")
+                    result.outcomes.append(replace(measure(one, sweep, runs=runs, planner=name), method=method))
                 if long:
                     tell(f"{OUR_LONG_METHOD}: {one.name}")
                     result.outcomes.append(measure(one, sweep, planner=planner, long=True))

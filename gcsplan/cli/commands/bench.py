@@ -23,6 +23,13 @@ WithoutOption = Annotated[
 ]
 
 
+OwnOption = Annotated[
+    list[str] | None,
+    typer.Option("--method", metavar="MODULE:FUNCTION", help="A method of your own beside the others; repeatable."),
+]
+QuickOption = Annotated[bool, typer.Option("--quick", help="A small part, which takes a minute or two.")]
+
+
 def _tell(result: dict[str, Any], report: Callable[[Any], str], as_json: bool) -> None:
     if as_json:
         emit(result)
@@ -67,6 +74,20 @@ def bench_upload(
     _tell(result, bench.report, as_json)
 
 
+@bench_app.command("session", short_help="A living session: first path, cancelling, memory.")
+def bench_session(
+    changes: Annotated[int, typer.Option(metavar="N", help="Changes of the goal, on each terrain.")] = 40,
+    cancels: Annotated[int, typer.Option(metavar="N", help="Plans that are cancelled at random moments.")] = 40,
+    memory: Annotated[int, typer.Option(metavar="N", help="Changes over which memory is measured [0: none].")] = 0,
+    seed: Annotated[int, typer.Option(metavar="N", help="Seed of missions and moments.")] = 1,
+    as_json: JsonOption = False,
+) -> None:
+    """Measure a session of Python on the sample terrain with 40 zones and on a tile of one degree with 30 m posts."""
+    from gcsplan.bench import session as bench
+
+    _tell(bench.run(changes, cancels, memory, seed), bench.report, as_json)
+
+
 @bench_app.command("fleet", short_help="A large fleet, from mission file to upload.")
 def bench_fleet(
     vehicles: Annotated[int, typer.Option(metavar="N", help="Vehicles, 2 to 2000.")] = 1000,
@@ -90,6 +111,8 @@ def bench_fleet(
 def bench_functions(
     runs: Annotated[int, typer.Option(metavar="N", help="Runs of each (paper: 50).")] = 50,
     seed: Annotated[int, typer.Option(metavar="N", help="Seed of all runs.")] = 1,
+    method: OwnOption = None,
+    quick: QuickOption = False,
     jobs: JobsOption = None,
     out: Annotated[Path | None, typer.Option("-o", "--out", metavar="DIR", help="CSV and Markdown go there.")] = None,
     as_json: JsonOption = False,
@@ -102,7 +125,8 @@ def bench_functions(
 
     if out is not None:
         ready(out)  # find a bad directory before the long run
-    result = bench.run(runs=runs, seed=seed, jobs=jobs)
+    chosen = (*bench.WOLVES, *(method or ()))
+    result = bench.run(runs=min(runs, 3) if quick else runs, seed=seed, jobs=jobs, algorithms=chosen)
     if out is not None:
         bench.write(result, out)
     _tell(result, bench.report, as_json)
@@ -127,6 +151,8 @@ def bench_terrain(
     gap: Annotated[float, typer.Option("--gap", metavar="PERCENT", help="Certified gap at which ours may stop.")] = 0.1,
     count: Annotated[int | None, typer.Option(metavar="N", help="Problems of each group [default: all]")] = None,
     without: WithoutOption = None,
+    method: OwnOption = None,
+    quick: QuickOption = False,
 ) -> None:
     """Plan a set of problems made from a seed with every planner; the same exact check judges all."""
     from rich.console import Console
@@ -140,9 +166,10 @@ def bench_terrain(
     except ValueError:
         raise UsageError(f"--seconds takes numbers such as 1,10, given {seconds!r}") from None
     result = terrain.run(
-        out, seed=seed, kinds=kinds.split(","), runs=runs, seconds=budgets, rivals=rivals, swarms=swarms,
-        kept_only=kept, long=minute, errors=errors, count=count, tell=remark, gap_percent=gap,
-        without=without or (),
+        out, seed=seed, kinds=["main"] if quick else kinds.split(","), runs=1 if quick else runs,
+        seconds=budgets[:1] if quick else budgets, rivals=rivals and not quick, swarms=swarms, kept_only=kept,
+        long=minute, errors=errors, count=2 if quick else count, tell=remark, gap_percent=gap, without=without or (),
+        methods=method or (),
     )  # fmt: skip
     Console(file=RESULTS, width=200).print(terrain_report.table(result.lines, f"terrain, seed {seed}"))
 

@@ -171,8 +171,10 @@ def plan(
     png: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE.png|DIR",
-            help="Also draw map and profiles to this picture; into a directory: each figure as a picture of its own.",
+            "--picture",
+            "--png",
+            metavar="FILE|DIR",
+            help="Also draw map and profiles to this .png, .svg or .pdf; into a directory: each figure as a .png.",
         ),
     ] = None,
     units: UnitsOption = UnitsChoice.METRIC,
@@ -459,9 +461,11 @@ def _require_options(planner: str | None, objective: str | None, png: Path | Non
     if objective not in (None, "length", "energy"):
         raise UsageError(f"--objective {objective}: give length or energy")
     each = png is not None and (png.is_dir() or png == directory)
-    named = png is not None and png.suffix.lower() == ".png" and (png.parent.is_dir() or png.parent == directory)
-    if png is not None and not (each or named):
-        raise UsageError(f"--png {png}: give a directory, or a name that ends in .png in a directory that exists")
+    drawn = png is not None and png.suffix.lower() in (".png", ".svg", ".pdf")
+    if png is not None and not (each or (drawn and (png.parent.is_dir() or png.parent == directory))):
+        raise UsageError(
+            f"--picture {png}: give a directory, or a name that ends in .png, .svg or .pdf in a directory that exists"
+        )
     return each
 
 
@@ -535,7 +539,7 @@ def _pictures(planned: Plan, png: Path, each: bool) -> dict[Path, bytes]:
 
     if each:
         return {png / name: content for name, content in outputs.figures_of(planned).items()}
-    return {png: outputs.picture_of(planned)}
+    return {png: outputs.picture_of(planned, png.suffix.lower()[1:])}
 
 
 def _upload(jobs: list[UploadJob], gate: GateTime | None, **options: Any) -> list[JobResult]:

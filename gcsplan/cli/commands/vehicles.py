@@ -220,7 +220,7 @@ def download(
     from gcsplan.app.upload import run as uploads
     from gcsplan.cli.output.console import say
 
-    items = uploads.download_to(source, sysid, out, timeout_s=timeout)
+    items = len(uploads.download_to(source, sysid, out, timeout_s=timeout).wire_items())
     if as_json:
         emit({"file": str(out), "items": items})
     else:

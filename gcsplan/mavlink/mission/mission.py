@@ -138,6 +138,9 @@ class Mission:
     name: str = ""
     sysid: int = 1
 
+    def __repr__(self) -> str:
+        return f"<Mission {self.name!r} for {self.autopilot}, system {self.sysid}: {len(self.wire_items())} items>"
+
     @property
     def first_seq(self) -> int:
         """Wire seq of ``items[0]``: 1 where home is item 0, else 0."""

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from functools import cache
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
 from pydantic import (
     AfterValidator,
@@ -383,6 +384,19 @@ class MissionKeys(Keys):
 
 
 TOP_KEYS = tuple(MissionKeys.model_fields)
+
+
+@cache
+def text_keys() -> frozenset[str]:
+    """The keys of all sections whose values are, or may be, text."""
+
+    def takes_text(kind: Any) -> bool:
+        return kind is str or any(map(takes_text, get_args(kind)))
+
+    kinds = [Keys]
+    for kind in kinds:
+        kinds += kind.__subclasses__()
+    return frozenset(key for kind in kinds for key, field in kind.model_fields.items() if takes_text(field.annotation))
 
 
 def shown(value: Any) -> str:

@@ -206,6 +206,12 @@ def _scalar(node: yaml.Node, where: str) -> Any:
     return text
 
 
+def number_or_text(text: str) -> float | str:
+    """A number in the form that this reader takes for one and YAML 1.1 for text, such as ``6.5e6``; else ``text``."""
+    is_number = len(text) < 40 and ("e" in text or "E" in text) and _YAML_FLOAT.match(text)
+    return float(text) if is_number else text
+
+
 def _require_tag(node: yaml.Node, kind: str, where: str) -> None:
     if node.tag not in (_TAG + kind, "!"):
         raise InputError(f"the tag {node.tag[:80]!r} is not allowed here; write the plain value",

@@ -69,13 +69,16 @@ def plan_over(problem: Problem, plan_window: PlanFunction) -> Solution:
 
 
 def _reported(now: Problem, begun: float, leaving: float) -> Callable[[Progress], None] | None:
-    """The problem's ``progress``, if any, with seconds since ``begun`` and bounds that hold beyond the border, too."""
+    """The problem's ``progress``, if any, with seconds since ``begun`` and bounds that hold beyond the border, too,
+    and for ends that are rounded."""
     report = now.progress
     if report is None:
         return None
 
+    rounding = now.rounding()
+
     def held(state: Progress) -> None:
-        bound = None if state.lower_bound is None else min(state.lower_bound, leaving)
+        bound = None if state.lower_bound is None else rounding.bound(min(state.lower_bound, leaving))
         report(replace(state, elapsed_s=time.perf_counter() - begun, lower_bound=bound))
 
     return held

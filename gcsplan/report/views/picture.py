@@ -1,4 +1,4 @@
-"""Pictures of a report's page as PNG: the map from above, altitude profiles, the fleet over time, the view in space.
+"""Pictures of a report's page: the map from above, altitude profiles, the fleet over time, the view in space.
 
 `draw_space` has shaded terrain, zones as solids, and the tracks.
 """
@@ -61,10 +61,11 @@ def draw(page: Page) -> Figure:
     return figure
 
 
-def save(page: Page, file: FilePath | IO[bytes]) -> None:
-    """Write the picture of `draw` as PNG."""
-    with rc_context({"text.parse_math": False}):  # a dollar sign in a name must stay a dollar sign
-        draw(page).savefig(file, format="png", dpi=110, metadata=_described(page))
+def save(page: Page, file: FilePath | IO[bytes], form: str = "png") -> None:
+    """Write the picture of `draw` as png, svg or pdf; the same page gives the same bytes."""
+    # A dollar sign in a name must stay a dollar sign, and names within an SVG must not be random.
+    with rc_context({"text.parse_math": False, "svg.hashsalt": "gcsplan"}):
+        draw(page).savefig(file, format=form, dpi=110, metadata=_described(page, form))
 
 
 def figures(page: Page) -> dict[str, bytes]:
@@ -92,10 +93,13 @@ def figures(page: Page) -> dict[str, bytes]:
     return out
 
 
-def _described(page: Page) -> dict[str, str | None]:
-    """The metadata of a picture: the mission, and the length of each vehicle's path."""
+def _described(page: Page, form: str = "png") -> dict[str, str | None]:
+    """The metadata of a picture: the mission, and the length of each vehicle's path; no date and no program."""
     lengths = "; ".join(f"{v.name}: {v.verdict.length_m:,.0f} m" for v in page.subjects)
-    return {"Software": None, "Title": page.title, "Description": lengths}
+    if form == "pdf":
+        return {"Title": page.title, "Subject": lengths, "Creator": None, "Producer": None, "CreationDate": None}
+    without = {"Date": None, "Creator": None} if form == "svg" else {"Software": None}
+    return {**without, "Title": page.title, "Description": lengths}
 
 
 def _figure(width: float, height: float) -> Figure:

@@ -7,6 +7,7 @@ so comparisons should use equal evaluations too.
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
@@ -14,6 +15,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, cast
 
 from gcsplan.errors import InputError, unknown_name
+from gcsplan.plugins import OPTIMISERS_ADDED, function_at
 
 if TYPE_CHECKING:
     from gcsplan.research.optimisers.box import Steps
@@ -305,6 +307,9 @@ _OPTIMISERS = (
     ),
 )
 
+ADDED_POPULATION, ADDED_ITERATIONS = 50, 400
+"""Population and iterations of an optimiser that was added, unless a benchmark sets its own."""
+
 OPTIMISERS: Mapping[str, OptimiserEntry] = MappingProxyType({entry.name: entry for entry in _OPTIMISERS})
 
 
@@ -314,8 +319,15 @@ def names() -> tuple[str, ...]:
 
 
 def get(name: str) -> OptimiserEntry:
-    """The optimiser called ``name``. Raises InputError if it is unknown, with the closest known name."""
+    """The optimiser called ``name``, or at ``MODULE:FUNCTION``.
+
+    Raises InputError if it is unknown, with the closest known name.
+    """
     entry = OPTIMISERS.get(name)
-    if entry is None:
-        raise unknown_name(f"there is no optimiser {name!r}", name, OPTIMISERS)
-    return entry
+    if entry is not None:
+        return entry
+    added = function_at(name, "optimiser") if ":" in name else OPTIMISERS_ADDED.get(name)
+    if added is None:
+        raise unknown_name(f"there is no optimiser {name!r}", name, (*OPTIMISERS, *OPTIMISERS_ADDED.names()))
+    words = (inspect.getdoc(added) or "").partition("\n")[0]
+    return OptimiserEntry(name, words, added, "", "", population=ADDED_POPULATION, iterations=ADDED_ITERATIONS)

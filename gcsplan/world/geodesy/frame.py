@@ -52,6 +52,9 @@ class Frame:
             f"+proj=pipeline +step +inv {plane} +step +proj=unitconvert +xy_in=rad +xy_out=deg"
         )
 
+    def __reduce__(self) -> tuple[type[Frame], tuple[float, float, float]]:
+        return Frame, (self.lat_deg, self.lon_deg, self.amsl_m)
+
     @cached_property
     def crs(self) -> CRS:
         """The plane as a coordinate system, for rasters that have one of their own."""

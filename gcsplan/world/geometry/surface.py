@@ -145,6 +145,14 @@ class Surface:
         if not self.ground_m.shape == self.top_m.shape == self.high.shape:
             raise ValueError(f"ground {self.ground_m.shape} and top {self.top_m.shape} differ in shape")
 
+    def __reduce__(self) -> tuple[type[Surface], tuple[object, ...]]:
+        # Made anew, so that its arrays are read-only there, too.
+        return Surface, (self.ground_m, self.top_m, self.grid, self.info, self.goes_on, self.high_m)
+
+    def __repr__(self) -> str:
+        rows, cols = self.ground_m.shape
+        return f"<Surface: {rows} × {cols} nodes>"
+
     @property
     def high(self) -> Floats:
         """``high_m``, which is never None once the surface is made."""

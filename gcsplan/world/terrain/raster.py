@@ -8,12 +8,14 @@ Heights belong to pixel centres, whatever AREA_OR_POINT states: GDAL's transform
 from __future__ import annotations
 
 import gzip
+import hashlib
 import math
 import os
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -118,24 +120,29 @@ def open_raster(
     height_unit: str | None = None,
     datum_unit: HeightUnit | None = None,
     nodata: float | None = None,
+    data: bytes | None = None,
 ) -> Raster:
     """Header of the raster at ``path`` (GeoTIFF, .vrt of GeoTIFFs, SRTM .hgt, DTED, .img, netCDF, .xyz, ESRI .asc).
 
-    The keywords are the user's statements (`RasterStatements`).
+    The keywords are the user's statements (`RasterStatements`). ``data``: the bytes of a GeoTIFF that lies on no disk;
+    ``path`` is then its name in messages.
 
     If neither the file nor one beside it or that it names has changed since this process opened it, it is not opened
     again: many missions use the same tiles. Raises InputError for anything that is not a readable, georeferenced,
     north-up raster of real numbers.
     """
-    tell_raster(path)
-    require_file(path, where=where)
     given = RasterStatements(crs, height_unit, datum_unit, nodata)
-    key = (path.absolute(), given, states_of(beside(path)))
     try:
+        if data is not None:
+            with gdal(path, data=data) as dataset:
+                return _header(dataset, path, given, data, where=where)[0]
+        tell_raster(path)
+        require_file(path, where=where)
+        key = (path.absolute(), given, states_of(beside(path)))
         found = remembered_headers.get(key)
         if found is None or found[2] != states_of(found[0].files):  # one that a sidecar names may lie anywhere
             with gdal(path) as dataset:
-                header, to_metres = _header(dataset, path, given, where=where)
+                header, to_metres = _header(dataset, path, given, None, where=where)
             if len(remembered_headers) >= MOST_HEADERS:
                 remembered_headers.clear()
             found = remembered_headers[key] = header, to_metres, states_of(header.files)
@@ -168,10 +175,11 @@ def require_file(path: Path, *, where: str) -> None:
 
 
 @contextmanager
-def gdal(path: Path, other: str = "") -> Iterator[Any]:
+def gdal(path: Path, other: str = "", data: bytes | None = None) -> Iterator[Any]:
     """The dataset at ``path``, whatever GDAL's environment variables state about pixel corners.
 
-    ``other``: the driver for a file that is no GeoTIFF, if the file's name does not decide it.
+    ``other``: the driver for a file that is no GeoTIFF, if the file's name does not decide it. ``data``: the bytes of a
+    GeoTIFF, in place of the file.
     """
     with _quiet_proj():
         import rasterio
@@ -191,6 +199,10 @@ def gdal(path: Path, other: str = "") -> Iterator[Any]:
         # Our own check of the georeference reports more; the other warnings are between rasterio and its dependencies.
         for category in (NotGeoreferencedWarning, DeprecationWarning, PendingDeprecationWarning):
             warnings.simplefilter("ignore", category)
+        if data is not None:
+            with rasterio.MemoryFile(data) as held, held.open(driver="GTiff") as dataset:
+                yield dataset
+            return
         with rasterio.open(_opened(path), driver=_driver(path, other)) as dataset:
             yield dataset
 
@@ -320,7 +332,9 @@ def require_numbers(dataset: Any, path: Path, *, where: str) -> None:
         )
 
 
-def _header(dataset: Any, path: Path, given: RasterStatements, *, where: str) -> tuple[Raster, tuple[float, float]]:
+def _header(
+    dataset: Any, path: Path, given: RasterStatements, data: bytes | None, *, where: str
+) -> tuple[Raster, tuple[float, float]]:
     notes: list[Note] = []
     crs = given.crs
     if dataset.count < 1:
@@ -367,12 +381,12 @@ def _header(dataset: Any, path: Path, given: RasterStatements, *, where: str) ->
     if not (math.isfinite(scale) and math.isfinite(offset)) or scale == 0.0:
         raise InputError(f"{path} has a broken scale {scale} or offset {offset}", where=where)
 
-    files = files_of(dataset, path)
+    files = files_of(dataset, path) if data is None else ()
     to_metres = (scale * factor, offset * factor)
     header = Raster(
         path.name, system, t.c, t.f, t.a, -t.e, dataset.width, dataset.height, system.vertical,
-        _reader(path, *to_metres, given.nodata, where=where), _stored_bytes(files), lambda: sha256_of_all(files),
-        tuple(notes), unit, files,
+        _reader(path, *to_metres, given.nodata, data, where=where), _stored_bytes(files) if data is None else len(data),
+        partial(sha256_of_all, files) if data is None else hashlib.sha256(data).hexdigest, tuple(notes), unit, files,
     )  # fmt: skip
     return header, to_metres
 
@@ -383,10 +397,12 @@ def _stored_bytes(files: Sequence[Path]) -> int:
     return sum(part.stat().st_size for part in parts)
 
 
-def _reader(path: Path, scale: float, offset: float, nodata: float | None, *, where: str) -> Reader:
+def _reader(
+    path: Path, scale: float, offset: float, nodata: float | None, data: bytes | None = None, *, where: str
+) -> Reader:
     def read(col: int, row: int, cols: int, rows: int) -> Iterator[tuple[int, Floats]]:
         try:
-            with gdal(path) as opened:
+            with gdal(path, data=data) as opened:
                 yield from _strips(opened, (col, row, cols, rows), scale, offset, nodata)
         except Exception as why:
             raise InputError(_unreadable(path, why), where=where) from None

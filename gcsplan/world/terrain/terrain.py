@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Literal, Protocol
@@ -76,7 +76,8 @@ class TerrainSpec:
     exact zeros are ground or sea.
     ``obstacle_height_m`` stands everywhere; ``canopy`` is a raster of heights above ground, whose nodata cells are
     unknown unless ``canopy_nodata_m`` sets their height; if both are set the higher one counts. ``sea``: where a
-    published source has no tile, or no tile of the user's own knows the ground, there is sea.
+    published source has no tile, or no tile of the user's own knows the ground, there is sea. ``held``: by
+    their names in ``dem``, GeoTIFFs that lie on no disk.
     """
 
     dem: tuple[str, ...] = ()
@@ -91,6 +92,7 @@ class TerrainSpec:
     canopy: str | None = None
     canopy_nodata_m: float | None = None
     sea: bool = False
+    held: Mapping[str, bytes] = field(default_factory=dict)
 
 
 class OpenTerrain(Protocol):
@@ -449,14 +451,17 @@ def _rasters(spec: TerrainSpec, where: str) -> list[Raster]:
         return [sample_jacksboro()]
     if any(d.startswith("sample:") for d in spec.dem):
         raise InputError(f"the only sample is {SAMPLE}, given {spec.dem[0]}", where=where)
-    paths = tiles_of(spec.dem, where=where)
+    if spec.held:  # in the order given, which counts where layers overlap
+        paths = [path for d in spec.dem for path in ([d] if d in spec.held else tiles_of([d], where=where))]
+    else:
+        paths = tiles_of(spec.dem, where=where)
     datum = place(where.removesuffix(".dem"), "vertical_datum")
     unit = None if spec.vertical_datum is None else stated_datum(spec.vertical_datum, where=datum)[1]
     nodata = None if spec.nodata == NO_MORE_VOIDS else spec.nodata
     return [
         open_raster(
             Path(path), where=f"{where}[{i}]" if len(paths) > 1 else where, crs=spec.crs,
-            height_unit=spec.height_unit, datum_unit=unit, nodata=nodata,
+            height_unit=spec.height_unit, datum_unit=unit, nodata=nodata, data=spec.held.get(path),
         )
         for i, path in enumerate(paths)
     ]  # fmt: skip

@@ -9,8 +9,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from gcsplan.app.fleet.pipeline import plan
+from gcsplan.app.output.files import picture_of
 from gcsplan.app.output.report import page_of_plan
 from gcsplan.report.views.picture import draw, figures
+from tests.export.test_output_schema import FLAT
 from tests.support.pages import (
     planned,
 )
@@ -42,3 +45,11 @@ def test_the_map_has_the_reports_colours_low_ground_is_no_lake() -> None:
     pixels = np.asarray(Image.open(io.BytesIO(drawn)).convert("RGB"), np.int16)
     red, green, blue = np.moveaxis(pixels, -1, 0)
     assert float(np.mean((blue > green + 20) & (blue > red + 20))) < 0.001
+
+
+@pytest.mark.parametrize(("form", "begins"), [("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF")])
+def test_a_picture_of_each_form_has_the_same_bytes_again(form: str, begins: bytes) -> None:
+    small = plan(FLAT)
+    one, other = (picture_of(small, form) for _ in range(2))
+    assert one.startswith(begins)
+    assert one == other

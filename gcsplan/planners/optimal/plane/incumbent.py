@@ -224,7 +224,8 @@ class Incumbent:
         """Report progress with ``cost``, or else with the best path's cost if there is a path."""
         if self.problem.progress is not None:
             known = self.cost if cost is None and self.best is not None else cost
-            self.problem.progress(Progress(self.budget.elapsed_s, known, self.bound, phase))
+            whole = None if self.best is None or self.piece or cost is not None else Path(self.best)
+            self.problem.progress(Progress(self.budget.elapsed_s, known, self.bound, phase, whole))
 
     def solution(self) -> Solution:
         """The best path, with as few way points as `WORTH` allows, and the bound."""

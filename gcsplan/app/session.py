@@ -1,0 +1,307 @@
+"""`Planner`: a mission that lives in memory, is changed key by key, and is planned again without being loaded anew.
+
+    session = Planner("mission.yaml")
+    session.change({"vehicles.uav1.goal": [36.61, -84.17], "limits.max_agl_m": 120})
+    planned = session.plan(on_path=show)
+
+A plan of a session has the same bytes as the command line writes for the same mission: both read and plan by the same
+functions. A session only keeps what they would read again.
+"""
+
+from __future__ import annotations
+
+import copy
+import os
+import re
+import threading
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from gcsplan.app.fleet import pipeline
+from gcsplan.app.plan.arguments import require
+from gcsplan.app.plan.model import Plan
+from gcsplan.arrays import Floats
+from gcsplan.errors import InputError, UsageError, cancelled_by, heed_cancel, unknown_name
+from gcsplan.mission_file import load_mission
+from gcsplan.mission_file.kept import KeptWorld
+from gcsplan.mission_file.load import load_content
+from gcsplan.mission_file.request import Content, MissionFile
+from gcsplan.mission_file.source import read_content
+from gcsplan.planners.problem import Problem, Progress, Solution
+
+__all__ = ["BetterPath", "Planner"]
+
+MissionSource = MissionFile | str | os.PathLike[str] | Mapping[str, Any]
+
+_STEP = re.compile(r"\.?([^.\[\]]+)|\[(\d+)\]")
+"""A step of a key's place: a name, or the number of an element."""
+
+
+@dataclass(frozen=True, eq=False)
+class BetterPath:
+    """A path that is better than all before it in this plan, while the search goes on.
+
+    ``lat_deg``, ``lon_deg``, ``amsl_m``: its way points, (N,) each. Its legs keep the limits with the planner's
+    margins, but the mission made of it is not judged: only the `Plan` that is returned is proved. ``cost`` and
+    ``lower_bound`` are metres, or joules if the objective is energy; ``elapsed_s`` counts from the call.
+    """
+
+    vehicle: str
+    lat_deg: Floats
+    lon_deg: Floats
+    amsl_m: Floats
+    cost: float
+    lower_bound: float | None
+    elapsed_s: float
+
+    def to_geojson(self) -> dict[str, Any]:
+        """The path as a Feature; the third coordinate is metres above mean sea level."""
+        places = np.column_stack([self.lon_deg, self.lat_deg, self.amsl_m]).tolist()
+        about = {"vehicle": self.vehicle, "cost": self.cost, "lower_bound": self.lower_bound, "judged": False}
+        return {"type": "Feature", "properties": about, "geometry": {"type": "LineString", "coordinates": places}}
+
+
+PathCall = Callable[[BetterPath], None]
+BoundCall = Callable[[str, float], None]
+"""Called with the vehicle's name and its lower bound, metres or joules."""
+
+
+class Planner:
+    """A mission that is changed and planned again; its terrain and zones stay in memory.
+
+    ``mission`` is anything that `load_mission` accepts, or what it returned. The other arguments are those of `plan`,
+    for every plan of the session. Files are read once: `reload` reads them again.
+
+    All methods may be called from any thread. One plan is made at a time, the others wait; `cancel` ends them all.
+    Raises InputError if the mission cannot be read.
+
+    Examples:
+        >>> from gcsplan import Planner
+        >>> session = Planner({
+        ...     "version": 1, "terrain": {"flat_m": 100},
+        ...     "frame": {"origin": [36.6, -84.3], "amsl_m": 0},
+        ...     "limits": {"min_agl_m": 30},
+        ...     "vehicles": [{"name": "uav1", "sysid": 1, "autopilot": "arducopter", "speed_m_s": [3, 15],
+        ...                   "start": {"east_m": 0, "north_m": 0}, "goal": {"east_m": 900, "north_m": 0}}],
+        ... })
+        >>> session.change({"vehicles.uav1.goal": {"east_m": 500, "north_m": 0}})
+        >>> session.plan()
+        <Plan 'mission': uav1 500 m safe>
+        >>> session.plan({"limits.min_agl_m": 50}).vehicles[0].verdict.lowest.min_agl_m >= 50  # for this plan alone
+        True
+    """
+
+    def __init__(
+        self,
+        mission: MissionSource,
+        *,
+        planner: str | Callable[[Problem], Solution] | None = None,
+        objective: str | None = None,
+        seed: int | None = None,
+        options: Mapping[str, object] | None = None,
+        at: str | Sequence[str] | None = None,
+    ) -> None:
+        require("Planner", planner=planner, objective=objective, seed=seed, options=options)
+        self._options: dict[str, Any] = {
+            "planner": planner, "objective": objective, "seed": seed, "options": options,
+        }  # fmt: skip
+        source = mission if isinstance(mission, MissionFile) else load_mission(mission, at=at)
+        if source.content is None:
+            raise UsageError(
+                "the mission was not made by load_mission: give its file, text or mapping", where="Planner()"
+            )
+        # Lines of a text would be those before its changes.
+        self._content: Content = replace(source.content, text=None)
+        self._kept = KeptWorld()
+        self._planning, self._state = threading.RLock(), threading.Lock()
+        self._cancels = 0
+
+    def __repr__(self) -> str:
+        return f"<Planner of {self._content.where!r}>"
+
+    @property
+    def mission(self) -> dict[str, Any]:
+        """A copy of the mission's keys as they are now; files that were given as objects have names in it."""
+        return copy.deepcopy(self._content.given)
+
+    def change(self, changes: Mapping[str, object]) -> None:
+        """Change keys of the mission, all of them or none; nothing is planned.
+
+        A key is named by its place, as messages name it: ``limits.max_agl_m``, ``vehicles[0].goal``,
+        ``vehicles.uav1.start`` (by the vehicle's name), ``no_fly.village`` (by the zone's). The value None removes it.
+        ``no_fly.NAME`` that is not there yet adds a zone; so does ``no_fly[N]`` behind the last one. Values are those
+        of a mission as a mapping, GeoJSON included.
+
+        Raises InputError for a place that is not there. Whether the mission is right, the next plan says.
+        """
+        with self._state:
+            self._content = _changed(self._content, changes)
+
+    def plan(
+        self,
+        changes: Mapping[str, object] | None = None,
+        *,
+        on_path: PathCall | None = None,
+        on_bound: BoundCall | None = None,
+        leave_out: bool | None = None,
+    ) -> Plan:
+        """Plan the mission as it is now; ``changes`` count for this plan alone.
+
+        ``on_path(better)`` is called for each path that is better than those before, ``on_bound(vehicle, bound)`` for
+        each higher lower bound, both in this thread while the search goes on; what they raise ends the plan.
+
+        Returns what `gcsplan.plan` returns. Raises InputError, NoMission, and Cancelled after `cancel`.
+        """
+        return self._planned(self._cancels, changes, on_path, on_bound, leave_out)
+
+    def _planned(
+        self,
+        cancels: int,
+        changes: Mapping[str, object] | None,
+        on_path: PathCall | None,
+        on_bound: BoundCall | None,
+        leave_out: bool | None,
+    ) -> Plan:
+        """See `plan`; a cancel after the first ``cancels`` ends it."""
+        require("plan", on_path=on_path, on_bound=on_bound, leave_out=leave_out)
+        begun_s = time.perf_counter()
+        content = self._content if changes is None else _changed(self._content, changes)
+        with cancelled_by(lambda: self._cancels != cancels), self._planning:
+            heed_cancel()
+            source = load_content(content, self._kept)
+            heard = _Listening(source, on_path, on_bound, begun_s) if on_path or on_bound else None
+            return pipeline.plan(source, progress=heard, leave_out=leave_out, **self._options)
+
+    async def plan_async(
+        self,
+        changes: Mapping[str, object] | None = None,
+        *,
+        on_path: PathCall | None = None,
+        on_bound: BoundCall | None = None,
+        leave_out: bool | None = None,
+    ) -> Plan:
+        """`plan` in a thread of its own, which calls ``on_path`` and ``on_bound``. If the task is cancelled, so is the
+        plan, and every other one of this session."""
+        import asyncio
+
+        given = (self._cancels, changes, on_path, on_bound, leave_out)  # a cancel counts before the thread begins, too
+        try:
+            return await asyncio.to_thread(self._planned, *given)
+        except asyncio.CancelledError:
+            self.cancel()
+            raise
+
+    def cancel(self) -> None:
+        """End every plan of this session that has begun or waits; each raises Cancelled. Later plans are not affected.
+
+        A plan ends at its next step of counted work, or within some milliseconds between them.
+        """
+        with self._state:
+            self._cancels += 1
+
+    def reload(self) -> None:
+        """Forget what is kept of files, so that the next plan reads them as they are then."""
+        with self._planning:
+            self._kept = KeptWorld()
+
+
+class _Listening:
+    """Turns a plan's progress into calls for better paths and bounds. A search that begins anew with larger margins
+    has paths of its own, which count from the first again."""
+
+    def __init__(
+        self, source: MissionFile, on_path: PathCall | None, on_bound: BoundCall | None, begun_s: float
+    ) -> None:
+        self._frame, self._on_path, self._on_bound, self._begun_s = source.frame, on_path, on_bound, begun_s
+        self._known: dict[str, tuple[float, float, float]] = {}  # by vehicle: cost, bound, seconds of its search
+
+    def __call__(self, vehicle: str, state: Progress) -> None:
+        cost, bound, until_s = self._known.get(vehicle, (np.inf, 0.0, 0.0))
+        if state.elapsed_s < until_s:
+            cost, bound = np.inf, 0.0
+        if state.lower_bound is not None and state.lower_bound > bound and self._on_bound is not None:
+            bound = state.lower_bound
+            self._on_bound(vehicle, bound)
+        if state.path is not None and state.cost is not None and state.cost < cost and self._on_path is not None:
+            cost = state.cost
+            points = state.path.points
+            lat, lon = self._frame.to_degrees(points[:, 0], points[:, 1]).T
+            elapsed_s = time.perf_counter() - self._begun_s
+            self._on_path(BetterPath(vehicle, lat, lon, points[:, 2].copy(), cost, state.lower_bound, elapsed_s))
+        self._known[vehicle] = cost, bound, state.elapsed_s
+
+
+def _changed(content: Content, changes: Mapping[str, object]) -> Content:
+    """The content with other values of some keys. Raises InputError, UsageError."""
+    if not isinstance(changes, Mapping):
+        raise UsageError(
+            "changes are a mapping from keys to values, such as {'limits.min_agl_m': 40}", where="change()"
+        )
+    given, held = copy.deepcopy(content.given), dict(content.held)
+    for place, value in changes.items():
+        if not isinstance(place, str):
+            raise UsageError(f"a key is named by text, such as 'limits.min_agl_m'; given {place!r}", where="change()")
+        _put(given, place, value)
+    given = read_content(given, None, held=held)[2]  # arrays, GeoJSON and tuples as in any mapping
+    text = repr(given)
+    return replace(content, given=given, held={name: data for name, data in held.items() if repr(name) in text})
+
+
+def _put(whole: dict[str, Any], place: str, value: object) -> None:
+    """Set, add or remove what ``place`` names. Raises InputError."""
+    steps: list[str | int] = []
+    at = 0
+    for found in _STEP.finditer(place):
+        if found.start() != at:
+            break
+        at = found.end()
+        steps.append(found[1] if found[2] is None else int(found[2]))
+    if at != len(place) or not steps:
+        raise InputError(f"no key has the place {place[:80]!r}; places are such as vehicles[0].goal", where="change()")
+    if steps[0] == "no_fly" and len(steps) == 2 and not whole.get("no_fly"):
+        whole["no_fly"] = []  # this is the first zone
+    here: Any = whole
+    for step in steps[:-1]:
+        if isinstance(here, dict) and isinstance(step, str):
+            here = here.setdefault(step, {})
+            continue
+        here = here[_index(here, step, place)]
+    last = steps[-1]
+    if isinstance(here, dict) and isinstance(last, str):
+        here.pop(last, None) if value is None else here.update({last: value})
+        return
+    if isinstance(here, list):
+        known = _named(here)
+        new = last == len(here) or (isinstance(last, str) and last not in known and steps[0] == "no_fly")
+        if new and value is not None:
+            named = isinstance(last, str) and isinstance(value, Mapping) and "type" not in value
+            here.append({"name": last, **value} if named else value)  # type: ignore[dict-item]
+            return
+    index = _index(here, last, place)
+    if value is None:
+        del here[index]
+    else:
+        here[index] = value
+
+
+def _named(elements: list[Any]) -> dict[str, int]:
+    """The numbers of elements by their names."""
+    return {str(e["name"]): k for k, e in enumerate(elements) if isinstance(e, dict) and e.get("name")}
+
+
+def _index(here: Any, step: str | int, place: str) -> int:
+    """The number of an element that is named or counted. Raises InputError."""
+    if not isinstance(here, list):
+        raise InputError(f"{place[:80]} is not there: {str(step)[:40]!r} is no key of a value", where="change()")
+    known = _named(here)
+    if isinstance(step, str):
+        if step not in known:
+            raise unknown_name(f"{place[:80]} is not there: no element is named {step[:40]!r}", step, known)
+        return known[step]
+    if step >= len(here):
+        raise InputError(f"{place[:80]} is not there: the list has {len(here)} elements", where="change()")
+    return step
