@@ -309,8 +309,8 @@ def test_a_function_fits_on_a_screen() -> None:
 MOST_IN_A_FOLDER = 15
 
 MOST = {
-    "modules": 434,
-    "statements": 61_348,
+    "modules": 459,
+    "statements": 65_148,
     "type names with two meanings": 0,
     "constants with two values": 1,
     "folders with more than 15 modules": 0,
@@ -373,7 +373,7 @@ def arrows_between_folders() -> dict[str, set[str]]:
     return arrows
 
 
-OTHERS = {"_replace", "_exit", "_timestamp", "_getvalue"}
+OTHERS = {"_replace", "_exit", "_timestamp", "_getvalue", "_repr_html_"}
 """Names of other libraries that begin with _, and of named tuples."""
 
 

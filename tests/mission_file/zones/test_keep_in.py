@@ -199,7 +199,7 @@ def test_files_of_authorities_and_files_without_an_area_are_refused(tmp_path: Pa
     assert any("has no area" in one for one in refusal(mission([{"file": str(tmp_path / "t.geojson")}])))
 
 
-def test_inclusion_areas_of_a_plan_are_joined_and_exclusion_areas_belong_under_no_fly(tmp_path: Path) -> None:
+def test_inclusion_areas_of_a_plan_are_joined_and_exclusions_are_zones(tmp_path: Path) -> None:
     circle = {"circle": {"center": [46.01, 14.01], "radius": 300}, "inclusion": True, "version": 1}
     fence: dict[str, Any] = {
         "version": 2, "circles": [circle], "polygons": [{"polygon": BEND, "inclusion": True, "version": 1}],
@@ -239,7 +239,7 @@ def test_areas_and_their_holes_count_in_the_hash_of_the_zones(tmp_path: Path) ->
     assert zones_sha256(found) != plain.inputs["zones_sha256"]
 
 
-def test_a_kml_edge_may_be_straight_or_a_great_circle_so_only_what_both_enclose_is_inside(tmp_path: Path) -> None:
+def test_inside_a_kml_edge_is_what_its_line_and_its_great_circle_enclose(tmp_path: Path) -> None:
     """Along 46° N a great circle over 4° of longitude lies 1.2 km north of the straight line."""
     corners = "14,46,0 18,46,0 18,47,0 14,47,0 14,46,0"
     outline = f"<outerBoundaryIs><LinearRing><coordinates>{corners}</coordinates></LinearRing></outerBoundaryIs>"

@@ -18,7 +18,7 @@ def plan_of(**fence: Any) -> dict[str, Any]:
     return {"fileType": "Plan", "geoFence": {"version": 2, **fence}}
 
 
-def test_inclusion_areas_are_kept_in_and_exclusion_areas_are_no_fly_also_across_the_antimeridian() -> None:
+def test_inclusions_keep_in_and_exclusions_are_no_fly_across_the_antimeridian() -> None:
     found = read_plan_fence(Path("f.plan"), plan_of(circles=[CIRCLE], polygons=[POLYGON]))
     assert [(d.name, d.keep_in, d.radius_m, d.floor) for d in found.zones] == [
         ("f[0]", True, 300.0, None), ("f[1]", False, None, None),

@@ -154,7 +154,7 @@ def test_no_leg_is_cheaper_than_a_plane(
     st.sampled_from(["length", "energy"]), st.floats(5.0, 44.0), st.floats(-1.2, 1.2), st.floats(-150.0, 150.0),
     st.floats(0.2, 12.0), st.floats(60.0, 240.0),
 )  # fmt: skip
-def test_a_rounded_leg_costs_no_more_in_expectation_than_the_leg_and_what_is_taken_off(
+def test_a_rounded_leg_costs_in_expectation_no_more_than_leg_and_rebate(
     objective: Objective, climb_deg: float, slope: float, aside: float, step: float, gap: float
 ) -> None:
     problem = limited(objective, climb_deg, climb_deg)
