@@ -259,9 +259,10 @@ def run(
     planner: Planner | None = None,
     stopped: Callable[[], bool] = lambda: False,
     most: int = WITNESSES,
+    world_s: float = WORLD_S,
 ) -> Tally:
     """Attack for ``seconds``, ``worlds`` seeds or until ``witnesses`` are drawn; every family on one seed, then on the
-    next."""
+    next, and each world for ``world_s``."""
     tally, begun, number = Tally(), time.monotonic(), seed
     while worlds is None or number - seed < worlds:
         for family in families:
@@ -269,7 +270,7 @@ def run(
                 return tally
             if witnesses is not None and sum(tally.drawn.values()) >= witnesses:
                 return tally
-            attack(family, number, tally, planner, keep, most)
+            attack(family, number, tally, planner, keep, most, world_s)
         number += 1
     return tally
 

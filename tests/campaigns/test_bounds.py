@@ -45,7 +45,7 @@ def refused(words: str) -> Planner:
 
 
 def kinds(planner: Planner, family: str, seed: int, most: int) -> set[str]:
-    tally = run(FOREVER_S, seed, (family,), worlds=1, planner=planner, most=most)
+    tally = run(FOREVER_S, seed, (family,), worlds=1, planner=planner, most=most, world_s=FOREVER_S)
     return {f.kind for f in tally.faults}
 
 
