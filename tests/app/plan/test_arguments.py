@@ -7,18 +7,18 @@ from typing import Any
 import pytest
 
 import gcsplan
-from gcsplan.errors import UsageError
+from gcsplan.errors import InputError, UsageError
 from tests.support.paths import DATA
 
 
 def no_planner(problem: object) -> None:
-    """A function where a name belongs."""
+    """A function that plans nothing."""
 
 
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        ({"planner": no_planner}, r"plan\(\).*planner is the name of a planner.*given function no_planner"),
+        ({"planner": 7}, r"plan\(\).*planner is the name of a planner.*given int"),
         ({"seed": "1"}, "seed is a whole number; given str '1'"),
         ({"seed": True}, "seed is a whole number"),
         ({"options": 3}, "options is a mapping"),
@@ -30,6 +30,11 @@ def no_planner(problem: object) -> None:
 def test_plan_refuses_arguments_of_another_type(given: dict[str, Any], words: str) -> None:
     with pytest.raises(UsageError, match=words):
         gcsplan.plan(DATA / "crossing.yaml", **given)
+
+
+def test_a_function_that_plans_nothing_is_refused_by_its_name() -> None:
+    with pytest.raises(InputError, match="planner no_planner: a planner returns a Solution, given NoneType"):
+        gcsplan.plan(DATA / "crossing.yaml", planner=no_planner)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("function", ["write", "report", "rehearse", "upload", "check"])
