@@ -140,10 +140,10 @@ class PlaneSearch:
 
     def reach_longest(self) -> bool:
         """Flood the legs as far as tracks lead that are no longer than the best path, if there is one. Returns False if
-        that proves it optimal, or if there is no path and that is proved."""
+        that proves it optimal, if there is no path and that is proved, or if better tracks have any length."""
         incumbent = self.incumbent
-        if incumbent.best is None:
-            return all(leg.seen for leg in self.legs) or self.flood(SLACKS[-1])
+        if math.isinf(incumbent.longest(math.inf)):  # no path is known, or a level metre costs nothing
+            return incumbent.best is None and (all(leg.seen for leg in self.legs) or self.flood(SLACKS[-1]))
         for leg in self.legs:
             limit = self.limit(leg)
             if not leg.seen:

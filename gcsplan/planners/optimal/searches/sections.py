@@ -106,7 +106,7 @@ class SectionChains(Search):
     def run(self) -> None:
         """Raise the bound, and try the cheapest chains as tracks, with more nodes each time."""
         plane, incumbent = self.work.plane, self.incumbent
-        if incumbent.best is None or not plane.legs or not plane.reach_longest() or math.isinf(plane.longest()):
+        if incumbent.best is None or not plane.legs or not plane.reach_longest():
             return
         planes, looked = Planes.of(self.problem), None
         for pairs, halvings in LOOKS:

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from gcsplan.planners.optimal.loop.workspace import Workspace
 from gcsplan.planners.optimal.plane.incumbent import Incumbent
 from gcsplan.planners.optimal.plane.sections import lay_out, lines_of, widest_spans
+from gcsplan.planners.optimal.searches.bound import Bound
 from gcsplan.planners.optimal.searches.sections import Planes, SectionChains
 from gcsplan.planners.optimal.searches.straight import Straight
 from gcsplan.planners.problem import Objective, Problem, Via
@@ -117,6 +118,24 @@ def test_unknown_ground_among_the_nodes_leaves_no_sections() -> None:
         plane = looked(replace(problem, airspace=air)).plane
         lines = lines_of(plane, 120.0)
         assert (lay_out(plane, lines, widest_spans(plane, lines, 3700.0), 20.0) is not None) == known
+
+
+@pytest.mark.parametrize("limits", [Limits(30.0, 60.0), Limits(30.0, max_amsl_m=130.0)])
+def test_where_level_metres_cost_nothing_no_bound_is_above_a_long_way_around(limits: Limits) -> None:
+    x, y = np.meshgrid(np.arange(61) * POST_M, 2400.0 - np.arange(61) * POST_M)
+    ridge = 60.0 * np.exp(-(((x - 1200.0) / 150.0) ** 2)) * np.clip((y - 300.0) / 200.0, 0.0, 1.0)
+    air = Airspace(Surface(ridge, ridge, GridMap.affine(0.0, 2400.0, POST_M, POST_M)))
+    problem = Problem(
+        air, limits, (900.0, 1800.0, 40.0), (1500.0, 1800.0, 40.0), objective="energy", horizontal_j_per_m=0.0
+    )
+    around = Path(np.array([problem.start, (900.0, 100.0, 40.0), (1500.0, 100.0, 40.0), problem.goal]))
+    assert faults(problem, around) == []
+    assert problem.cost(around) == 0.0
+    work = looked(problem)
+    for search in (Straight(work), Bound(work), SectionChains(work)):
+        search.run()
+    assert work.incumbent.best is not None
+    assert work.incumbent.bound == 0.0
 
 
 def limited(objective: Objective, climb_deg: float, descent_deg: float) -> Problem:
