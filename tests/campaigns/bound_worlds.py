@@ -545,6 +545,34 @@ def insides(rng: np.random.Generator) -> Case:
     return case
 
 
+def banded(rng: np.random.Generator) -> Case:
+    """Mountains, stops or holes below a maximum height above ground, with levels of zones within that band."""
+    case = (mountains, stops, holes)[int(rng.integers(0, 3))](rng)
+    limits, vehicle = case.limits, case.vehicles[0]
+    if rng.random() < 0.8:
+        limits.pop("max_amsl_m", None)
+    low = limits["min_agl_m"]
+    high = low + 2.0 * limits["altitude_error_m"] + float(rng.uniform(12.0, 90.0))
+    limits["max_agl_m"] = high
+    if "takeoff_agl_m" not in vehicle:
+        above_m = round(low + limits["altitude_error_m"] + float(rng.uniform(4.0, 10.0)), 1)
+        vehicle["takeoff_agl_m"] = vehicle["approach_agl_m"] = above_m
+    case.altitude_frame = "relative"
+    ground = case.flat_m if case.terrain is None else float(np.nanmedian(case.terrain.heights))
+    for barrier in case.barriers:
+        kind = int(rng.integers(0, 4))  # without levels, with a floor, a ceiling, both
+        barrier.floor = level(rng, low + 5.0, high, ground) if kind in (1, 3) else None
+        barrier.ceiling = level(rng, low, high - 3.0, ground) if kind in (2, 3) else None
+        if (
+            barrier.floor
+            and barrier.ceiling
+            and (barrier.floor[1] != barrier.ceiling[1] or barrier.floor[0] >= barrier.ceiling[0])
+        ):
+            barrier.floor = None
+    case.family = "banded"
+    return case
+
+
 def denser(ring: Floats) -> Floats:
     """Points along the edges of a ring (N, 2)."""
     part = np.linspace(0.0, 1.0, 20)[:, None, None]
@@ -553,7 +581,7 @@ def denser(ring: Floats) -> Floats:
 
 FAMILIES: dict[str, Callable[[np.random.Generator], Case]] = {
     f.__name__: f for f in (
-        walls, slits, over, climbs, mountains, holes, stops, fleets, wings, returns, frames, bends, insides,
+        walls, slits, over, climbs, mountains, holes, stops, fleets, wings, returns, frames, bends, insides, banded,
     )
 }  # fmt: skip
 
