@@ -19,6 +19,9 @@ from hypothesis import is_hypothesis_test, settings
 
 from tests.support import effort
 
+RESEARCH = Path(__file__).parent / "research"
+"""Its slow tests are nightly."""
+
 
 def pytest_configure(config: pytest.Config) -> None:
     os.environ.pop("GCSPLAN_UNITS", None)  # the suite reads the words of the default
@@ -73,3 +76,6 @@ def pytest_collection_modifyitems(items: Sequence[pytest.Item]) -> None:
     for item in items if effort.full else ():
         if item.get_closest_marker("draws") or is_hypothesis_test(getattr(item, "obj", None)):
             item.add_marker("slow")
+    for item in items:
+        if RESEARCH in item.path.parents and item.get_closest_marker("slow"):
+            item.add_marker("nightly")  # it is apart, and a change seldom breaks it

@@ -24,7 +24,7 @@ from tests.oracles.optima_polish import PATIENT, cost_of, is_feasible
 from tests.oracles.optima_search import best_path
 from tests.support.planner_worlds import faults, ground
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.nightly
 
 # East, north, radius, top (m). With the centres that Table 7 prints, its cylinders would float 0.5 m or 1 m above the
 # ground. Here they stand on it, with the printed height ("7") or with the printed top ("7 raised").

@@ -113,7 +113,7 @@ def test_a_track_turns_where_rounding_has_made_two_corners_of_one() -> None:
 
 
 @pytest.mark.first_quick
-@pytest.mark.parametrize("seed", [2, 3, *(pytest.param(k, marks=pytest.mark.slow) for k in range(4, 30))])
+@pytest.mark.parametrize("seed", [2, 3, *(pytest.param(k, marks=pytest.mark.nightly) for k in range(4, 30))])
 def test_plans_on_flat_ground_are_certified_to_a_hair(seed: int) -> None:
     rng = np.random.default_rng([7, seed])
     p = mission(random_zones(rng, int(rng.integers(1, 60))), float(rng.choice([0.0, 33.0])))

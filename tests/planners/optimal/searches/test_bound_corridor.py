@@ -132,7 +132,7 @@ def _dense(track: Floats, problem: Problem) -> Floats:
 
 
 @pytest.mark.slow
-@pytest.mark.nightly_but("301-main 301/02, 40 zones-11690.0", "711-main 711/01, 40 zones-6600.0")
+@pytest.mark.nightly_but("301-main 301/02, 40 zones-11690.0")
 @pytest.mark.parametrize(
     ("seed", "name", "most_m"),
     [
