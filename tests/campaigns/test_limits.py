@@ -58,7 +58,7 @@ def test_corners_that_nobody_judges_are_found(monkeypatch: pytest.MonkeyPatch) -
     assert run(FOREVER_S, 3, ("vtol",), most=1, turns=2).unsafe
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("less", ["track_error_m", "altitude_error_m"])
 def test_errors_that_are_taken_too_small_are_found(monkeypatch: pytest.MonkeyPatch, less: str) -> None:
     """If the check takes an error 0.2 m too small, the campaign finds a mission that is wrongly called safe."""

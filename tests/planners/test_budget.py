@@ -206,7 +206,7 @@ print((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024.0, ti
 """
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_legs_whose_laps_leave_much_to_spare_share_memory_and_work() -> None:
     """Laps to climb to a via make all tracks of all legs a kilometre longer than the shortest, past small zones."""
     printed = subprocess.run([sys.executable, "-c", HIGH], capture_output=True, text=True, timeout=120, check=True)

@@ -112,6 +112,7 @@ def test_the_view_in_space_is_really_drawn_and_can_be_turned(page: Browser, repo
     assert page.complaints() == []
 
 
+@pytest.mark.nightly
 def test_pointing_tells_numbers_with_their_units_in_every_figure(page: Browser, report: Path) -> None:
     page.visit(report)
     told = {}
@@ -200,6 +201,7 @@ LABELS = """
 """
 
 
+@pytest.mark.nightly
 def test_labels_lie_on_no_label_and_on_no_symbol_on_a_desk_a_phone_and_on_paper(page: Browser, report: Path) -> None:
     for width in (1200, 390, "paper"):
         page.visit(report, width=1200 if width == "paper" else width)
@@ -218,6 +220,7 @@ def test_labels_lie_on_no_label_and_on_no_symbol_on_a_desk_a_phone_and_on_paper(
                 assert a[2] <= figure["frame"][2] + 0.5
 
 
+@pytest.mark.nightly
 def test_the_replay_moves_every_figure_by_slider_by_key_and_by_clock(page: Browser, report: Path) -> None:
     for width in (1200, 390):
         page.visit(report, width=width, phone=width < 500)
@@ -318,6 +321,7 @@ def test_without_scripts_the_map_the_profile_and_every_number_are_there(page: Br
     assert "lowest above ground" in page.evaluate("document.body.innerText")
 
 
+@pytest.mark.nightly
 def test_the_filter_narrows_every_table_the_map_and_the_replay(page: Browser, tmp_path: Path) -> None:
     file = tmp_path / "many.html"
     file.write_text(render_page(many_page(130)), encoding="utf-8")

@@ -355,8 +355,7 @@ def test_jacksboro_mission_winds_through_the_gaps_that_its_ceiling_and_zones_lea
     assert plan(bare).path.length_m < s.path.length_m - 500.0
 
 
-@pytest.mark.slow
-@pytest.mark.nightly_but("krill-mound-156.72")
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("name", "most_m"), [("krill-forest", 188.9), ("abo", 129.4), ("krill-hills", 162.6), ("krill-mound", 156.72)]
 )

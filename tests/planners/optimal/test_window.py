@@ -67,7 +67,7 @@ def box(west: float, south: float, east: float, north: float) -> Zone:
 # -- plans over several windows ----------------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_way_that_leaves_the_first_window_is_found_and_judged_where_it_leads() -> None:
     source = source_of(ROW_4)
     done = plan(source)
