@@ -6,6 +6,7 @@ single vehicle only: in a fleet an earlier landing changes all arrivals.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -13,7 +14,7 @@ from typing import Any
 
 from gcsplan.app.fleet.pipeline import plan
 from gcsplan.app.plan.model import Plan
-from gcsplan.app.plan.way_home import homes_of
+from gcsplan.app.plan.way_home import first_unsafe_m, homes_of
 from gcsplan.check.returns.proposal import ReturnProposal, best_first
 from gcsplan.check.returns.verdict import WayHome
 from gcsplan.check.verdict import LegFigures
@@ -31,11 +32,17 @@ LEAST_WAY_M = 200.0
 
 def best_changes(homes: Mapping[str, WayHome]) -> list[MissionChange]:
     """The best change for each way home that has one, as `--apply` makes them."""
+    best = {name: _by_keys(home) for name, home in homes.items()}
     return [
         MissionChange("--apply", "vehicle", key, list(value) if isinstance(value, tuple) else value, name)
-        for name, home in homes.items()
-        for key, value in (home.proposals[0].keys if home.proposals else ())
+        for name, proposal in best.items()
+        for key, value in (proposal.keys if proposal is not None else ())
     ]
+
+
+def _by_keys(home: WayHome) -> ReturnProposal | None:
+    """The best change that keys of the mission file make alone, without rally points on board."""
+    return next((proposal for proposal in home.proposals if not proposal.rally), None)
 
 
 def with_earlier_landing(planned: Plan, homes: Mapping[str, WayHome]) -> dict[str, WayHome]:
@@ -45,15 +52,16 @@ def with_earlier_landing(planned: Plan, homes: Mapping[str, WayHome]) -> dict[st
         return dict(homes)
     [v] = planned.vehicles
     home = homes.get(v.name)
-    best = home.proposals[0] if home is not None and home.proposals else None
-    if home is None or home.safe is not False or (best is not None and not best.leaves_m) or v.request.end != "land":
+    if home is None or home.safe is not False or v.request.end != "land" or not all(p.leaves_m for p in home.proposals):
         return dict(homes)
+    best = _by_keys(home)  # trials are judged without rally points
     keys = () if best is None else best.keys
-    there = home if best is None else _tried(planned, content, keys)
-    if there is None or there.safe is not False:
+    bad_m = first_unsafe_m(home) if best is None else best.first_m
+    if bad_m is None:
+        there = _tried(planned, content, keys)
+        bad_m = math.inf if there is None else first_unsafe_m(there)
+    if math.isinf(bad_m):
         return dict(homes)
-    short = there.battery.short if there.battery is not None else ()
-    bad_m = min([s.from_m for s in there.unsafe] + [from_m for from_m, _ in short])
     whole_m = sum(leg.horizontal_m for leg in v.verdict.legs)
     for part in PARTS:
         at_m = part * bad_m

@@ -88,18 +88,15 @@ def _with_proposals(v: VehiclePlan, home: WayHome) -> WayHome:
     if home.safe is not False or v.brief is None or home.route == "mission":
         return home
     tried = _by_altitude(v, home)
-    if not (home.set_rel_home_m is not None and not home.set_leaves_m and not home.set_above_max_agl):
-        path = _path_back(v)
-        tried += [] if path is None else [_by_mission(v, path)]
-        enough = home.set_rel_home_m is not None and not home.set_leaves_m
-        if (
-            path is not None
-            and not enough
-            and path.no_return_m < min([home.no_return_m, *(p.leaves_m for p in tried[:-1])])
-        ):
+    least_m = min([home.no_return_m, *(p.leaves_m for p in tried)])
+    enough = home.set_rel_home_m is not None and not home.set_leaves_m
+    path = _path_back(v) if not enough or home.set_above_max_agl else None
+    if path is not None:
+        tried.append(_by_mission(v, path))
+        if not enough and path.no_return_m < least_m:
             route = route_setting(v.request.vehicle.autopilot, path=True)
-            note = Note("path_back_helps", left_m=path.no_return_m, setting=route)
-            home = replace(home, path_back=Note("path_back_makes_safe", setting=route) if path.safe else note)
+            helps = Note("path_back_helps", left_m=path.no_return_m, setting=route)
+            home = replace(home, path_back=Note("path_back_makes_safe", setting=route) if path.safe else helps)
     better = [p for p in tried if p.leaves_m < home.no_return_m - ALIKE_M or not p.leaves_m]
     return replace(home, proposals=best_first(better))
 
@@ -115,7 +112,7 @@ def _by_altitude(v: VehiclePlan, home: WayHome) -> list[ReturnProposal]:
         if then is not None and then.not_judged:
             continue
         left_m = (home.set_leaves_m or 0.0) if then is None else then.no_return_m
-        found.append(_altitude(home, height_m, left_m))
+        found.append(_altitude(home, height_m, left_m, first_m=None if then is None else first_unsafe_m(then)))
         if then is not None and home.rally and height_m == home.set_rel_home_m:
             # The battery counts as for a return home, which is farther than one to the nearest place.
             short = then.battery.short if then.battery is not None else ()
@@ -124,20 +121,31 @@ def _by_altitude(v: VehiclePlan, home: WayHome) -> list[ReturnProposal]:
     return found
 
 
-def _altitude(home: WayHome, height_m: float, left_m: float, rally: int = 0) -> ReturnProposal:
+def first_unsafe_m(home: WayHome) -> float:
+    """Where on the mission the first part without a safe return begins, m; inf without one."""
+    short = home.battery.short if home.battery is not None else ()
+    return min([*(s.from_m for s in home.unsafe), *(from_m for from_m, _ in short)], default=math.inf)
+
+
+def _altitude(
+    home: WayHome, height_m: float, left_m: float, rally: int = 0, first_m: float | None = None
+) -> ReturnProposal:
     above = home.max_agl_m is not None and height_m > home.max_agl_m
     note = Note(
         "return_by_altitude", height_m=height_m, setting=setting(home.autopilot, height_m),
         above=Note("above_max_agl", max_agl_m=home.max_agl_m) if above else None,
         rally=Note("with_rally_points", count=rally) if rally else None,
     )  # fmt: skip
-    return ReturnProposal(note, left_m, (("rtl_rel_home_m", height_m),), above_max_agl=above)
+    return ReturnProposal(
+        note, left_m, (("rtl_rel_home_m", height_m),), above_max_agl=above, rally=rally, first_m=first_m
+    )  # fmt: skip
 
 
 def _by_mission(v: VehiclePlan, path: WayHome) -> ReturnProposal:
-    route = route_setting(v.request.vehicle.autopilot, path=True)
-    note = Note("return_by_mission", setting=route)
-    return ReturnProposal(note, path.no_return_m, (("return_route", "mission"),))
+    return ReturnProposal(
+        Note("return_by_mission", setting=route_setting(v.request.vehicle.autopilot, path=True)), path.no_return_m,
+        (("return_route", "mission"),), first_m=first_unsafe_m(path),
+    )  # fmt: skip
 
 
 def _judged_at(v: VehiclePlan, rel_home_m: float) -> WayHome:

@@ -16,8 +16,10 @@ ALIKE_M = 1.0
 class ReturnProposal:
     """A change in words, and the length ``leaves_m`` of the mission from which the return then is not safe.
 
-    ``keys``: the keys of the vehicle in the mission file that make the change. ``above_max_agl``: the return is higher
-    above home than the mission may fly above ground. ``shortens``: the mission ends at another place.
+    ``keys``: the keys of the vehicle in the mission file that make the change, beside the ``rally`` points that have to
+    be on board with them. ``above_max_agl``: the return is higher above home than the mission may fly above ground.
+    ``shortens``: the mission ends at another place. ``first_m``: where on the mission the first return that is left
+    unsafe begins, inf without one; None: not known.
     """
 
     change: Note
@@ -25,6 +27,8 @@ class ReturnProposal:
     keys: tuple[tuple[str, Any], ...]
     above_max_agl: bool = False
     shortens: bool = False
+    rally: int = 0
+    first_m: float | None = None
 
     @property
     def note(self) -> Note:
@@ -40,6 +44,7 @@ class ReturnProposal:
             "leaves_m": self.leaves_m,
             "keys": {key: list(value) if isinstance(value, tuple) else value for key, value in self.keys},
             "above_max_agl": self.above_max_agl,
+            "rally_points": self.rally,
         }
 
 

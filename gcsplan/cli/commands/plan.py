@@ -150,8 +150,8 @@ def plan(
         bool,
         typer.Option(
             "--apply",
-            help="Take the best change that is tried for the way home: plan with it, and write it into the "
-            "mission file.",
+            help="Take the best change that is tried for the way home, without rally points: plan with it, and write "
+            "it into the mission file.",
         ),
     ] = False,
     rally: Annotated[
@@ -368,8 +368,8 @@ def _best_changes(planned: Plan) -> list[MissionChange]:
 
     homes = with_earlier_landing(planned, homes_of(planned))
     for name, home in homes.items():
-        if home.safe is not True and not home.proposals:
-            remark(f"note: --apply: nothing that was tried makes more of the way home of {name} safe")
+        if home.safe is not True and not best_changes({name: home}):
+            remark(f"note: --apply: no key that was tried makes more of the way home of {name} safe")
     return best_changes(homes)
 
 

@@ -70,3 +70,24 @@ def test_where_the_battery_is_short_an_earlier_landing_comes_last_and_is_safe() 
     assert done.source.content is not None
     again = plan(load_mission(done.source.content.given, changes=changes))
     assert homes_of(again)["uav1"].safe is True
+
+
+WALL = {
+    "version": 1, "terrain": {"flat_m": 100}, "frame": {"origin": [46.0, 14.0], "amsl_m": 0},
+    "limits": {"min_agl_m": 30, "max_agl_m": 120},
+    "no_fly": [{"name": "wall", "line": [{"east_m": 400, "north_m": n} for n in (-200, 300)], "buffer_m": 20}],
+    "vehicles": [{
+        "name": "uav1", "sysid": 1, "autopilot": "arducopter", "speed_m_s": 10,
+        "start": {"east_m": 0, "north_m": 0}, "goal": {"east_m": 800, "north_m": 0},
+    }],
+}  # fmt: skip
+
+
+def test_rally_points_are_in_no_change_by_keys_and_no_trial() -> None:
+    """Trials are judged without rally points, so that nothing is said of returns to them."""
+    done = plan(load_mission(Path("wall.yaml"), text=yaml.safe_dump(WALL)))
+    homes = with_earlier_landing(done, homes_of(done))
+    proposals = homes["uav1"].proposals
+    assert [(p.rally > 0, p.shortens) for p in proposals] == [(True, False), (False, False), (False, True)]
+    assert "rally" not in str(proposals[-1].note)
+    assert [(c.key, c.value) for c in best_changes(homes)] == [("return_route", "mission")]
