@@ -201,7 +201,7 @@ def own_fence(
         return verdict, ()
     try:
         areas = areas_of(items, world.frame)
-        found = own_breaches(items, verdict.mission, vehicle, world) if verdict.legs else []
+        found = breaches(areas, verdict.mission, _plain(vehicle), world) if verdict.legs else []
     except InputError as error:
         why = Note("fence_unread", why=error.message)
         return replace(verdict, not_judged=(*verdict.not_judged, why)), ()

@@ -69,7 +69,7 @@ def read_fence(path: Path, data: bytes) -> ZoneFile:
         if len(corners) < 4 or corners[0] != corners[-1]:
             words = "a fence has a return point, three corners or more, and the first corner again; is the file whole?"
             raise InputError(words, where=str(path))
-    _add(found, path.stem, str(path), corners, inside=path.suffix.lower() != ".poly")
+    add_area(found, path.stem, str(path), corners, inside=path.suffix.lower() != ".poly")
     return found
 
 
@@ -131,7 +131,9 @@ def _areas(found: ZoneFile, rows: Sequence[tuple[int, RawItem]]) -> None:
         number += 1
         name = f"{found.path.stem} {number}"
         if first.command in (CIRCLE_IN, CIRCLE_OUT):
-            _add(found, name, where, [(first.x, first.y)], inside=_KINDS[int(first.command)], radius_m=first.params[0])
+            add_area(
+                found, name, where, [(first.x, first.y)], inside=_KINDS[int(first.command)], radius_m=first.params[0]
+            )
             k += 1
             continue
         same = [item for _, item in rows[k:]]
@@ -151,12 +153,10 @@ def _areas(found: ZoneFile, rows: Sequence[tuple[int, RawItem]]) -> None:
             k += len(same)
         else:
             corners = [(item.x, item.y) for item in same[:count]]
-            _add(found, name, where, corners, inside=_KINDS[int(first.command)])
+            add_area(found, name, where, corners, inside=_KINDS[int(first.command)])
             k += count
     _returns(found, returns)
-    inside = sum(draft.keep_in for draft in found.zones)
-    if inside > 1:
-        found.own_notes.append(Note("fence_areas_joined", count=inside))
+    note_joined(found)
 
 
 def _returns(found: ZoneFile, count: int) -> None:
@@ -164,10 +164,17 @@ def _returns(found: ZoneFile, count: int) -> None:
         found.own_notes.append(Note("fence_return_points_unused", count=count))
 
 
-def _add(
+def note_joined(found: ZoneFile) -> None:
+    """Note that a flight may be in any of several inclusion areas."""
+    inside = sum(draft.keep_in for draft in found.zones)
+    if inside > 1:
+        found.own_notes.append(Note("fence_areas_joined", count=inside))
+
+
+def add_area(
     found: ZoneFile, name: str, where: str, corners: list[Corner], *, inside: bool, radius_m: float | None = None
 ) -> None:
-    """Add an area; one that the aircraft stays ``inside`` is a keep-in area, and is never left out."""
+    """Add an area of a fence; one that the aircraft stays ``inside`` is a keep-in area, and is never left out."""
     before = len(found.problems)
     stated = ZoneStatements(name, radius_m, Bounds(), (), False, keep_in=inside)
     if radius_m is None:
