@@ -37,6 +37,8 @@ __all__ = ["BetterPath", "Planner"]
 
 MissionSource = MissionFile | str | os.PathLike[str] | Mapping[str, Any]
 
+ZONE_LISTS = ("no_fly", "keep_in")
+
 _STEP = re.compile(r"\.?([^.\[\]]+)|\[(\d+)\]")
 """A step of a key's place: a name, or the number of an element."""
 
@@ -133,8 +135,8 @@ class Planner:
 
         A key is named by its place, as messages name it: ``limits.max_agl_m``, ``vehicles[0].goal``,
         ``vehicles.uav1.start`` (by the vehicle's name), ``no_fly.village`` (by the zone's). The value None removes it.
-        ``no_fly.NAME`` that is not there yet adds a zone; so does ``no_fly[N]`` behind the last one. Values are those
-        of a mission as a mapping, GeoJSON included.
+        ``no_fly.NAME`` or ``keep_in.NAME`` that is not there yet adds a zone or area; so does ``no_fly[N]`` behind the
+        last one. Values are those of a mission as a mapping, GeoJSON included.
 
         Raises InputError for a place that is not there. Whether the mission is right, the next plan says.
         """
@@ -262,8 +264,8 @@ def _put(whole: dict[str, Any], place: str, value: object) -> None:
         steps.append(found[1] if found[2] is None else int(found[2]))
     if at != len(place) or not steps:
         raise InputError(f"no key has the place {place[:80]!r}; places are such as vehicles[0].goal", where="change()")
-    if steps[0] == "no_fly" and len(steps) == 2 and not whole.get("no_fly"):
-        whole["no_fly"] = []  # this is the first zone
+    if steps[0] in ZONE_LISTS and len(steps) == 2 and not whole.get(steps[0]):
+        whole[steps[0]] = []  # this is the first zone
     here: Any = whole
     for step in steps[:-1]:
         if isinstance(here, dict) and isinstance(step, str):
@@ -276,7 +278,7 @@ def _put(whole: dict[str, Any], place: str, value: object) -> None:
         return
     if isinstance(here, list):
         known = _named(here)
-        new = last == len(here) or (isinstance(last, str) and last not in known and steps[0] == "no_fly")
+        new = last == len(here) or (isinstance(last, str) and last not in known and steps[0] in ZONE_LISTS)
         if new and value is not None:
             named = isinstance(last, str) and isinstance(value, Mapping) and "type" not in value
             here.append({"name": last, **value} if named else value)  # type: ignore[dict-item]

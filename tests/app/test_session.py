@@ -72,6 +72,17 @@ def test_changes_count_from_then_on_or_for_one_plan_alone() -> None:
     assert session.plan().vehicles[0].verdict.length_m > 900
 
 
+def test_an_area_to_stay_in_is_added_and_removed_by_its_name() -> None:
+    session = Planner(LEGS)
+    before = figures(session.plan())
+    field = [{"east_m": e, "north_m": n} for e, n in ((-100, -20), (1000, -20), (1000, 300), (-100, 300))]
+    session.change({"keep_in.field": {"polygon": field}})
+    assert session.mission["keep_in"] == [{"name": "field", "polygon": field}]
+    assert figures(session.plan()) != before  # only the way past the mast through the north is left
+    session.change({"keep_in": None})
+    assert figures(session.plan()) == before
+
+
 def test_values_may_be_tuples_and_numbers_of_numpy() -> None:
     session = Planner(LEGS)
     session.change({"vehicles.uav1.speed_m_s": (3, np.float64(12.0)), "limits.min_agl_m": "4e1"})
