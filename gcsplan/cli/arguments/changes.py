@@ -123,7 +123,8 @@ def _circle(text: str) -> dict[str, Any]:
     band = _BAND.fullmatch(parts[-1]) if len(parts) > 2 else None
     if band is not None:
         parts.pop()
-    if len(parts) < 2 or (band is not None and not any(band.groups())):
+    few = len(parts) < 2 or (len(parts) == 2 and _numbers(parts[0], 1) is not None)  # a place may be one text
+    if few or (band is not None and not any(band.groups())):
         raise UsageError(f"--avoid {text}: give LAT,LON,RADIUS in degrees and metres, or LAT,LON,RADIUS,FLOOR-CEILING: "
                          "36.61,-84.31,400 or 36.61,-84.31,60,0-100")  # fmt: skip
     zone: dict[str, Any] = {
