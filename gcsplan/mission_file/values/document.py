@@ -89,10 +89,11 @@ class _Writing:
         """The value of the key ``name`` changes from ``old`` to ``new``."""
         if isinstance(node, yaml.MappingNode) and isinstance(old, dict) and isinstance(new, dict) and node.value:
             return self.mapping(node, old, new)
-        if isinstance(node, yaml.SequenceNode) and isinstance(old, list) and isinstance(new, list) and old:
-            kept = len(new) >= len(old) and all(_alike(a, b) for a, b in zip(old, new, strict=False))
-            if kept:
-                return self._sequence(node, old, new)
+        if (
+            isinstance(node, yaml.SequenceNode) and isinstance(old, list) and isinstance(new, list)
+            and 0 < len(old) <= len(new) and all(_alike(a, b) for a, b in zip(old, new, strict=False))
+        ):  # fmt: skip
+            return self._sequence(node, old, new)
         if (isinstance(node, yaml.ScalarNode) and node.value) or getattr(node, "flow_style", False):
             self.spans.append((node.start_mark.index, _end(node), flow(new)))
             return True
