@@ -1,0 +1,118 @@
+"""`DeclaredWind`: every wind that may blow during a flight, as a mission declares it.
+
+A wind is horizontal and is the same over a whole level. A declared wind is a set: at each of its heights (and hours,
+for a forecast) the speed lies between two speeds, and the direction between two directions. A *share* (speed,
+direction), each from 0 to 1, chooses one wind of the set: 0 is the lower end of each range, 1 the upper one. Between
+two heights, and between two hours, the vectors of one share are interpolated linearly; beyond the first and the last
+the nearest counts.
+
+- Without ``varying`` one share holds for the whole flight, at every height and hour: one unknown wind.
+- With ``varying`` the share may be another one at each place and time: any wind of the set, anywhere.
+- ``gust_m_s`` is the highest speed in a gust: gusts add at most what it exceeds the highest speed of the set by.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from gcsplan.arrays import Floats
+
+WindHeights = Literal["amsl", "agl"]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class DeclaredWind:
+    """A set of winds. Raises ValueError for arrays of other shapes, and for ranges that do not rise.
+
+    ``speed_m_s`` and ``from_deg`` (T, L, 2) are the lowest and highest speed, and the range of directions that the wind
+    comes from, clockwise from true north; the second is at most 360 above the first. ``heights_m`` (L,) rise, above sea
+    or above ground as ``heights`` says. ``times_s`` (T,) rise, seconds UTC since 1970; with one of them the wind is the
+    same at all hours.
+    """
+
+    speed_m_s: Floats
+    from_deg: Floats
+    heights_m: Floats = field(default_factory=lambda: np.zeros(1))
+    heights: WindHeights = "agl"
+    times_s: Floats = field(default_factory=lambda: np.zeros(1))
+    varying: bool = False
+    gust_m_s: float | None = None
+
+    def __post_init__(self) -> None:
+        shape = (len(self.times_s), len(self.heights_m), 2)
+        if self.speed_m_s.shape != shape or self.from_deg.shape != shape:
+            raise ValueError(f"speeds {self.speed_m_s.shape} and directions {self.from_deg.shape} need shape {shape}")
+        if not (self.speed_m_s[..., 0] >= 0.0).all() or not np.isfinite(self.speed_m_s).all():
+            raise ValueError("speeds are finite and 0 or more")
+        turns = self.from_deg[..., 1] - self.from_deg[..., 0]
+        if not ((turns >= 0.0) & (turns <= 360.0)).all() or not (np.diff(self.speed_m_s) >= 0.0).all():
+            raise ValueError("a range goes from its lower end to its upper one, and over at most a whole turn")
+        if not (np.diff(self.heights_m) > 0.0).all() or not (np.diff(self.times_s) > 0.0).all():
+            raise ValueError("heights and times rise")
+
+    @property
+    def still(self) -> bool:
+        """Whether the air does not move at all."""
+        return not self.most_m_s and not self.gust_m_s
+
+    @property
+    def single(self) -> bool:
+        """Whether the set has one wind alone, so that every share chooses it."""
+        return bool((self.speed_m_s[..., 0] == self.speed_m_s[..., 1]).all()) and bool(
+            ((self.from_deg[..., 0] == self.from_deg[..., 1]) | (self.speed_m_s[..., 1] == 0.0)).all()
+        )
+
+    @property
+    def most_m_s(self) -> float:
+        """The highest speed of the set, without gusts, m/s."""
+        return float(self.speed_m_s.max())
+
+    @property
+    def gusts_add_m_s(self) -> float:
+        """How much a gust adds at most to any wind of the set, m/s."""
+        return max((self.gust_m_s or 0.0) - self.most_m_s, 0.0)
+
+    def vectors_m_s(self, shares: Floats, amsl_m: Floats, agl_m: Floats, at_s: Floats) -> Floats:
+        """(K, N, 2) the wind's velocity, east and north, for ``shares`` (K, 2) at N heights and times.
+
+        ``amsl_m``, ``agl_m`` (N,) are heights of the same points; ``at_s`` (N,) are seconds UTC since 1970.
+        """
+        low, turn = self.speed_m_s[..., 0], np.radians(self.from_deg[..., 0])
+        speed = low + shares[:, 0, None, None] * (self.speed_m_s[..., 1] - low)
+        angle = turn + shares[:, 1, None, None] * (np.radians(self.from_deg[..., 1]) - turn)
+        levels = np.stack([-speed * np.sin(angle), -speed * np.cos(angle)], axis=-1)  # towards where it blows
+        return self._at(levels, amsl_m, agl_m, at_s)
+
+    def radius_m_s(self, cells: Floats, amsl_m: Floats, agl_m: Floats, at_s: Floats) -> Floats:
+        """(K, N) no wind of a cell of shares differs by more from the wind of the cell's middle, m/s.
+
+        ``cells`` (K, 2, 2): lower and upper share of speed, and of direction.
+        """
+        middle = cells.mean(axis=-1)
+        half = 0.5 * (cells[..., 1] - cells[..., 0])
+        spans = np.diff(self.speed_m_s)[..., 0], np.radians(np.diff(self.from_deg)[..., 0])
+        speed = self.speed_m_s[..., 0] + middle[:, 0, None, None] * spans[0]
+        # At most along the speed, then along the arc of the middle's speed.
+        radius = half[:, 0, None, None] * spans[0] + speed * half[:, 1, None, None] * spans[1]
+        return self._at(radius[..., None], amsl_m, agl_m, at_s)[..., 0]
+
+    def _at(self, levels: Floats, amsl_m: Floats, agl_m: Floats, at_s: Floats) -> Floats:
+        """(K, N, C) values of ``levels`` (K, T, L, C), interpolated linearly in time and height."""
+        t0, t1, dt = _between(self.times_s, at_s)
+        h0, h1, dh = _between(self.heights_m, amsl_m if self.heights == "amsl" else agl_m)
+        dt, dh = dt[:, None], dh[:, None]
+        early = levels[:, t0, h0] + dh * (levels[:, t0, h1] - levels[:, t0, h0])
+        late = levels[:, t1, h0] + dh * (levels[:, t1, h1] - levels[:, t1, h0])
+        at: Floats = early + dt * (late - early)
+        return at
+
+
+def _between(nodes: Floats, x: Floats) -> tuple[np.ndarray, np.ndarray, Floats]:
+    """The nodes below and above each of ``x``, and its part of the way between them; the ends count beyond them."""
+    above = np.clip(np.searchsorted(nodes, x, side="right"), 1, max(len(nodes) - 1, 1))
+    low, high = above - 1, np.minimum(above, len(nodes) - 1)
+    width = np.where(high > low, nodes[high] - nodes[low], 1.0)
+    return low, high, np.where(high > low, np.clip((x - nodes[low]) / width, 0.0, 1.0), 0.0)
