@@ -213,6 +213,15 @@ def test_names_that_developers_are_sent_to_are_there(name: str, paths: list[str]
     assert sorted(names - words - {Path(path).stem for path in paths}) == []
 
 
+@pytest.mark.parametrize("page", [TOP / "CONTRIBUTING.md", *PAGES], ids=lambda p: p.name)
+def test_names_in_brackets_behind_a_module_stand_in_it(page: Path, paths: list[str]) -> None:
+    text = page.read_text(encoding="utf-8")
+    for module, within in re.findall(r"`([\w/]+\.py)` \(([^()]*`\w+`[^()]*)\)", text):
+        files = [TOP / path[1:] for path in paths if path.endswith(f"/{module}")]
+        words = {word for file in files for word in re.findall(r"\w+", file.read_text(encoding="utf-8"))}
+        assert set(re.findall(r"`(\w+)`", within)) <= words, module
+
+
 def test_the_tutorial_s_mission_is_one(tmp_path: Path) -> None:
     text = (DOCS / "tutorial.md").read_text(encoding="utf-8")
     source, mission, datum = re.findall(r"^```(?:python|yaml)\n(.*?)^```", text, re.MULTILINE | re.DOTALL)[:3]
