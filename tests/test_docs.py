@@ -160,6 +160,18 @@ def test_the_contract_names_every_key_of_the_summary_and_every_kind_of_violation
         assert f"`{kind}`" in text, kind
 
 
+def test_the_contract_names_every_command() -> None:
+    import typer.main
+
+    from gcsplan.cli.command_table import app
+
+    text = (DOCS / "reference" / "contract.md").read_text(encoding="utf-8").split("```")[1]
+    groups: list[Any] = [typer.main.get_command(app)]
+    for group in groups:
+        assert [name for name in group.commands if not re.search(rf"\b{name}\b", text)] == []
+        groups += [one for one in group.commands.values() if hasattr(one, "commands")]
+
+
 def test_every_page_has_its_place_and_every_mark_its_part(made: ModuleType) -> None:
     text = (TOP / "mkdocs.yml").read_text(encoding="utf-8")
     assert "font: false" in text
