@@ -160,6 +160,18 @@ def test_the_contract_names_every_key_of_the_summary_and_every_kind_of_violation
         assert f"`{kind}`" in text, kind
 
 
+def test_the_contract_names_every_command() -> None:
+    import typer.main
+
+    from gcsplan.cli.command_table import app
+
+    text = (DOCS / "reference" / "contract.md").read_text(encoding="utf-8").split("```")[1]
+    groups: list[Any] = [typer.main.get_command(app)]
+    for group in groups:
+        assert [name for name in group.commands if not re.search(rf"\b{name}\b", text)] == []
+        groups += [one for one in group.commands.values() if hasattr(one, "commands")]
+
+
 def test_every_page_has_its_place_and_every_mark_its_part(made: ModuleType) -> None:
     text = (TOP / "mkdocs.yml").read_text(encoding="utf-8")
     assert "font: false" in text
@@ -211,6 +223,15 @@ def test_names_that_developers_are_sent_to_are_there(name: str, paths: list[str]
     words = {word for source in sources for word in re.findall(r"\w+", source.read_text(encoding="utf-8"))}
     names = {match[1] for one in named if (match := re.fullmatch(r"(?:\w+\.)*?(\w+)(?:\.py|\.md|\(.*\))?", one))}
     assert sorted(names - words - {Path(path).stem for path in paths}) == []
+
+
+@pytest.mark.parametrize("page", [TOP / "CONTRIBUTING.md", *PAGES], ids=lambda p: p.name)
+def test_names_in_brackets_behind_a_module_stand_in_it(page: Path, paths: list[str]) -> None:
+    text = page.read_text(encoding="utf-8")
+    for module, within in re.findall(r"`([\w/]+\.py)` \(([^()]*`\w+`[^()]*)\)", text):
+        files = [TOP / path[1:] for path in paths if path.endswith(f"/{module}")]
+        words = {word for file in files for word in re.findall(r"\w+", file.read_text(encoding="utf-8"))}
+        assert set(re.findall(r"`(\w+)`", within)) <= words, module
 
 
 def test_the_tutorial_s_mission_is_one(tmp_path: Path) -> None:

@@ -6,14 +6,17 @@
 from __future__ import annotations
 
 import ast
+import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
 
 import gcsplan
+from tests.support.paths import REPOSITORY
 
 ROOT = Path(gcsplan.__file__).parent
 MODULES = sorted(ROOT.rglob("*.py"))
@@ -21,13 +24,13 @@ MODULES = sorted(ROOT.rglob("*.py"))
 pytestmark = pytest.mark.xdist_group("house")  # one process reads the modules, not three
 
 # The packages from the bottom up. Each may import what stands in its set, and itself; a module in none is a mistake.
-WORLD = {"arrays", "errors", "figures", "native", "notes", "plugins", "units", "world"}
+WORLD = {"arrays", "errors", "figures", "native", "notes", "units", "world"}
 TERRAIN = WORLD | {"dem"}
 VEHICLE = WORLD | {"vehicle"}
 MISSION = VEHICLE | {"mavlink.mission"}
 MAVLINK = {"mavlink.mission", "mavlink.build", "mavlink.files", "mavlink.protocol", "mavlink.link"}
 ABOVE = VEHICLE | MAVLINK | {"planners", "fleet", "check", "wind"}
-OUTWARD = ABOVE | {"export", "report", "sim"}
+OUTWARD = ABOVE | {"export", "plugins", "report", "sim"}
 APP = OUTWARD | {"dem", "mission_file", "app"}
 
 MAY_IMPORT: dict[str, set[str]] = {
@@ -42,7 +45,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "dem": WORLD,
     "vehicle": WORLD,
     "logs": {"arrays", "errors", "figures", "notes"},
-    "planners": WORLD,
+    "planners": WORLD | {"plugins"},
     "wind": VEHICLE,
     "fleet": VEHICLE | {"wind"},
     "mavlink.mission": VEHICLE,
@@ -201,6 +204,20 @@ def test_a_package_imports_only_what_it_may() -> None:
     assert wrong == {}, "these modules may not import these packages"
 
 
+def test_the_table_allows_no_more_than_the_documents_say() -> None:
+    """A row of docs/architecture.md allows the packages that it names, and what these may import."""
+    page = (REPOSITORY / "docs" / "architecture.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| `([\w.]+)` \| .* \| ([^|]+) \|$", page.partition("## Packages")[2], re.MULTILINE)
+    said: dict[str, set[str]] = {}
+    for package, words in rows:
+        names = {*said} if words in ("all above", "everything") else {*re.findall(r"[\w.]+", words.split(" (")[0])}
+        said[package] = names.union(*(said[name] for name in names))
+    assert {*said, "__main__"} == {*MAY_IMPORT}
+    assert {package: MAY_IMPORT[package] - names - {package} for package, names in said.items()} == {
+        package: set() for package in said
+    }
+
+
 def test_the_table_has_no_circle() -> None:
     for name, below in MAY_IMPORT.items():
         assert [other for other in below if name in MAY_IMPORT.get(other, ())] == [], name
@@ -221,6 +238,34 @@ def circles(arrows: dict[str, set[str]]) -> list[list[str]]:
 
     reach = {name: reached(name) for name in arrows}
     return sorted({tuple(sorted(b for b in reach[a] if a in reach.get(b, ()))) for a in arrows if a in reach[a]})
+
+
+FILE_ENDINGS = {"geojson", "kml", "plan", "py"}
+
+
+def test_a_name_that_a_docstring_sends_to_stands_in_its_module() -> None:
+    """`module.name`: the name stands in a module of this name, or is a module in a package of this name."""
+    texts = {path: path.read_text(encoding="utf-8") for path in MODULES}
+    places: dict[str, list[str]] = {}  # what stands in a module or package, by its name
+    for path, text in texts.items():
+        *packages, last = module_of(path).split(".")
+        places.setdefault(last, []).append(text)
+        for package, inner in pairwise([*packages, last]):
+            places.setdefault(package, []).append(inner)
+    lacking = [
+        f"{name_of(path)}: `{module}.{name}`"
+        for path, text in texts.items()
+        for module, name in re.findall(r"(?<!`)`(?:\w+\.)*?(\w+)\.(\w+)`", text)
+        if module in places and name not in FILE_ENDINGS
+        if not any(re.search(rf"\b{name}\b", place) for place in places[module])
+    ]
+    assert lacking == []
+
+
+def test_the_table_of_a_package_s_docstring_names_its_modules() -> None:
+    for path in (p for p in MODULES if p.name == "__init__.py"):
+        rows = re.findall(r"^`(\w+)` {2,}", path.read_text(encoding="utf-8"), re.MULTILINE)
+        assert {*rows} <= {inner.stem for inner in path.parent.iterdir()}, name_of(path)
 
 
 def test_no_files_import_each_other_in_a_circle() -> None:

@@ -17,7 +17,7 @@ from itertools import groupby
 from typing import Any
 
 from gcsplan.check.motion.return_rules import RETURN_RULES, return_s
-from gcsplan.check.motion.stopping import more_m
+from gcsplan.check.motion.stopping import detour_home_m
 from gcsplan.check.motion.stretch import Place, flat_m
 from gcsplan.check.verdict import LegFigures, Verdict
 from gcsplan.figures import raised
@@ -104,7 +104,7 @@ def battery_home(verdict: Verdict, vehicle: Vehicle, home: Place, return_amsl_m:
     def back_j(at: Place, speed_m_s: float, stands: bool) -> float:
         level = rule.level_amsl_m(return_amsl_m, at[2])
         down_m = max(level - home[2], 0.0)
-        way_m = flat_m(at, home) + (0.0 if stands else more_m(vehicle, vehicle.speed_max_m_s, at[2]))
+        way_m = flat_m(at, home) + (0.0 if stands else detour_home_m(vehicle, vehicle.speed_max_m_s, at[2]))
         waits_j = energy.hold_w() * vehicle.return_waits_s
         # The metres are the same with any base power; without one the time counts nothing.
         seconds = return_s(vehicle, way_m, level - at[2], down_m, speed_m_s) if energy.base_w else math.nan

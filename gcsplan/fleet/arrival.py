@@ -363,7 +363,7 @@ def schedule(
     """Departures and speeds with which the fleet arrives as requested.
 
     ``mode``: ``sequence`` is in ``order`` (names; None: as in ``crews``; ``best``: the order that finishes earliest,
-    exact, see `order.best_order`), ``interval_s`` apart; ``together`` has a common arrival; with ``none`` all leave at
+    exact, see `best_order`), ``interval_s`` apart; ``together`` has a common arrival; with ``none`` all leave at
     once, at their fastest. With ``arrive_s``, the first of a sequence, or all together, arrive then. Without it,
     together arrives when the slowest can at its fastest, and a sequence begins as early as all can follow
     (``clock="fleet"``: the first at its fastest, or later if another one could not keep its turn), or with the first at

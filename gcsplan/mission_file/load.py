@@ -1,7 +1,7 @@
 """Reads the parts of a mission file in order and reports every mistake at once.
 
 Each mistake has its file, its key path, the given value and the required one. The parts are in `schema` (keys),
-`vehicles` and `terminals` (vehicles, limits, start, via points and goal), and `world` (points, terrain, zones).
+`vehicles` and `terminals` (vehicles, limits, start, via points and goal), and `scene` (points, terrain, zones).
 """
 
 from __future__ import annotations

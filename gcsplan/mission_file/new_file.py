@@ -1,4 +1,4 @@
-"""The text of a new mission file: every key with what it is, its unit and default, and the choices that are left."""
+"""The text of a new mission file: each of its keys with what it is, its unit and default, and the choices left."""
 
 from __future__ import annotations
 

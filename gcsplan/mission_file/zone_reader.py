@@ -39,6 +39,11 @@ PLAN = ".plan"
 MAX_ZONE_BYTES = 20_000_000
 """Most bytes of a file, and of what is unpacked from one."""
 
+TEXT_READERS: dict[str, Callable[[Path, bytes], ZoneFile]] = {
+    ".kml": read_kml, ".csv": read_csv, **dict.fromkeys((*FENCE_ZONES, *OPENAIR_ZONES), read_fence),
+}  # fmt: skip
+"""The reader of each ending of text other than JSON."""
+
 
 def read_zones(
     path: Path,
@@ -107,15 +112,11 @@ def _read(path: Path, kind: str, data: bytes, layer: str | None, whole: Any) -> 
         return read_plan_fence(path, whole)
     if kind == ".kmz":
         return read_kml(path, unpack(path, data, [".kml"], MAX_ZONE_BYTES)[".kml"])
-    if kind in (*FENCE_ZONES, *OPENAIR_ZONES):
-        return read_fence(path, data)
-    if kind == ".csv":
-        return read_csv(path, data)
     if kind in VECTOR_ZONES:
         from gcsplan.mission_file.zones.vector import read_vector  # most missions need neither it nor PROJ's database
 
         return read_vector(path, data, layer=layer, most_bytes=MAX_ZONE_BYTES)
-    return read_kml(path, data)
+    return TEXT_READERS[kind](path, data)
 
 
 def _bytes(path: Path, where: str) -> bytes:

@@ -23,7 +23,7 @@ Objective = Literal["length", "energy"]
 
 ENDS_M = 25.0
 """Metres by which floors and ceilings over a line, which are conservative, are too strict in rough ground at worst. So
-they do not decide whether start and goal themselves are legal (`refusal.check_ends` does)."""
+they do not decide whether start and goal themselves are legal (`explain.check_ends` does)."""
 PASSED_M = 1e-3
 """Metres within which a path passes a via."""
 

@@ -2,7 +2,6 @@
 
 ====================  ========================================================================================
 `rehearsal`           upload to loopback vehicles, fly, judge
-`part`                one vehicle's part in a rehearsal: mission, verdict, planned times
 `outcome`             the result of a rehearsal, counted over its runs
 `vehicle`             the simulated vehicle: its protocol, what it stores and sends, the server in front of it
 `flight`              the simulated flight: a stored mission as a track, flown in simulated time

@@ -57,7 +57,7 @@ __all__ = ["Airspace", "Band", "LegReport", "Legs", "Tube", "Violation", "Violat
 
 NEAR_M, NEAR_PART = 0.01, 0.01
 """The kernel finds the nearest place of a zone over ground to this many metres, or this part of the distance
-(`_sweep_zones.nearest_conflict`)."""
+(`sweep_zones.nearest_conflict`)."""
 
 ViolationKind = Literal["min_agl", "max_agl", "max_amsl", "terrain_clearance", "zone", "climb", "descent", "coverage"]
 
@@ -409,9 +409,9 @@ _KIND_NUMBERS = {kind: number for number, kind in _VIOLATION_KINDS.items()}
 class WorkArrays(threading.local):
     """Arrays for `judge` to work in: one set for each thread, reset before each call.
 
-    Pieces of legs that are still to be looked at (256, 8); numbers of the leg at hand (`_sweep_terrain`), and the count
-    `cut`; splits of a leg by a polygon, two for each corner; for each zone the leg that it was listed for, -1 before;
-    and a list of zones (0, 1, …).
+    Pieces of legs that are still to be looked at (256, 8); numbers of the leg at hand (`kernels/sweep_terrain.py`),
+    and the count `cut`; splits of a leg by a polygon, two for each corner; for each zone the leg that it was listed
+    for, -1 before; and a list of zones (0, 1, …).
     """
 
     def __init__(self) -> None:
@@ -434,7 +434,7 @@ class WorkArrays(threading.local):
 
     @property
     def cut(self) -> float:
-        """How many pieces of ground the last call of `judge` cut, see `_sweep_beside.deepest`."""
+        """How many pieces of ground the last call of `judge` cut, see `sweep_beside.deepest`."""
         return float(self._out[CUT])
 
 

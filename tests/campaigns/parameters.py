@@ -31,7 +31,7 @@ from gcsplan.app.rehearse import parts_of
 from gcsplan.app.upload.job import UploadJob
 from gcsplan.app.upload.on_board import judge_on_board
 from gcsplan.app.upload.run import jobs_of
-from gcsplan.check.motion.stopping import run_on_m
+from gcsplan.check.motion.stopping import braking_distance_m
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.mavlink.mission.parameter_names import OnBoard
@@ -246,7 +246,7 @@ def faults(kind: str, case: Case, raw: Values, spare: float) -> list[str]:
             found.append("lower in the cone")
     if kind == "copter-required":
         accel = raw.get("WPNAV_ACCEL", 250.0) / 100.0
-        judged_m, speed = run_on_m(vehicle, 9.0), 9.0
+        judged_m, speed = braking_distance_m(vehicle, 9.0), 9.0
         runs_m = speed**2 / (2.0 * accel) + accel / 2.0  # get_stopping_point_NE_m
         if runs_m > judged_m * 1.03 + 0.1:
             found.append(f"runs on {runs_m:.0f} m of {judged_m:.0f}")

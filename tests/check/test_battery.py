@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from gcsplan.check.battery import BatteryHome, battery_home, flown
 from gcsplan.check.judge import judge
-from gcsplan.check.motion.stopping import more_m
+from gcsplan.check.motion.stopping import detour_home_m
 from gcsplan.check.verdict import LegFigures, Verdict
 from gcsplan.mavlink.mission.commands import LAND, LOITER_TIME, RTL, TAKEOFF, WAYPOINT
 from gcsplan.mavlink.mission.mission import RELATIVE, Home, Mission, MissionItem
@@ -174,7 +174,7 @@ def test_what_is_short_is_what_sampling_finds(
             away = math.hypot(*FLAT.frame.to_plane(at[0], at[1]))
             more = MORE_M * (leg.horizontal_m > 0.0)  # a copter that moves brakes first, a plane turns about
             if not climbs_first:
-                more = more_m(replace(v, autopilot=autopilot), v.speed_max_m_s, at[2])
+                more = detour_home_m(replace(v, autopilot=autopilot), v.speed_max_m_s, at[2])
             top = max(300.0 + level, at[2]) if climbs_first else 300.0 + level
             need = spent + f * leg.energy_j + R2 * (away + more) + R1 * (abs(top - at[2]) + top - 300.0)
             most = max(most, need)

@@ -16,7 +16,7 @@ from gcsplan.app.plan.flight_hours import beyond_hours
 from gcsplan.app.plan.way_home import against_on_board
 from gcsplan.app.upload.fence import against_fence
 from gcsplan.check.judge import judge
-from gcsplan.check.motion.stopping import run_on_m, run_past_m
+from gcsplan.check.motion.stopping import braking_distance_m, run_past_m
 from gcsplan.check.motion.turn_parameters import Tuning
 from gcsplan.check.verdict import Verdict
 from gcsplan.mavlink.mission.commands import RTL
@@ -205,7 +205,10 @@ def _runs_farther(judged: Vehicle, flies: Vehicle, mission: Mission) -> bool:
     """Whether a return runs on farther than was judged, from a leg or from a corner."""
     speed_m_s, more = max(mission.commanded_m_s, judged.speed_max_m_s), 1.0 + SAME_PART
     past_m = [run_past_m(v, speed_m_s, RIGHT_ANGLE_RAD) for v in (judged, flies)]
-    return run_on_m(flies, speed_m_s) > more * run_on_m(judged, speed_m_s) or past_m[1] > more * past_m[0]
+    return (
+        braking_distance_m(flies, speed_m_s) > more * braking_distance_m(judged, speed_m_s)
+        or past_m[1] > more * past_m[0]
+    )
 
 
 def _against_return(job: UploadJob, flies: Vehicle, verdict: Verdict) -> Note | None:

@@ -56,8 +56,8 @@ BRAKES = {
 }
 
 
-def run_on_m(vehicle: Vehicle, speed_m_s: float) -> float:
-    """How far a multicopter at a speed runs on, straight ahead, before it turns home, m; 0 for a plane."""
+def braking_distance_m(vehicle: Vehicle, speed_m_s: float) -> float:
+    """The braking distance: how far a multicopter flies on straight ahead before it turns home, m; 0 for a plane."""
     brakes = brakes_of(vehicle)
     return 0.0 if brakes is None else brakes.length_m(speed_m_s)
 
@@ -119,8 +119,8 @@ def circle_home_m(radius_m: float, vehicle: Vehicle, amsl_m: float) -> float:
     return max(radius_m, CIRCLE_SPARE * speed**2 / GRAVITY_M_S2) + CIRCLE_LATE_S * speed
 
 
-def more_m(vehicle: Vehicle, speed_m_s: float, amsl_m: float) -> float:
+def detour_home_m(vehicle: Vehicle, speed_m_s: float, amsl_m: float) -> float:
     """How much longer than the straight line home a return is, m: out and back, or the turn about."""
     if vehicle.autopilot is Autopilot.ARDUPLANE:
         return 0.5 * math.pi * about_turn_m(vehicle, speed_m_s, amsl_m)
-    return 2.0 * run_on_m(vehicle, speed_m_s)
+    return 2.0 * braking_distance_m(vehicle, speed_m_s)

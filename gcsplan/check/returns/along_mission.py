@@ -25,7 +25,7 @@ import numpy as np
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.check.battery import BatteryHome, LegBattery
 from gcsplan.check.motion.return_rules import RETURN_RULES, at_home_m, return_s
-from gcsplan.check.motion.stopping import about_turn_m, more_m
+from gcsplan.check.motion.stopping import about_turn_m, detour_home_m
 from gcsplan.check.motion.stretch import Stretch
 from gcsplan.check.returns.footprint import Target, places_of_returns
 from gcsplan.check.returns.return_targets import Join, Joins, Ways, candidates
@@ -147,7 +147,7 @@ class _Judge:
     def _way_j(self, parts: TraceParts, ways: Ways) -> Floats:
         """(N,) energy of the longest way from each part, J."""
         vehicle, speed = self.vehicle, self.trace.speed_m_s[parts.stretch]
-        way_m = ways.away_m + ways.wide_m + more_m(vehicle, vehicle.speed_max_m_s, float(self.trace.amsl.max()))
+        way_m = ways.away_m + ways.wide_m + detour_home_m(vehicle, vehicle.speed_max_m_s, float(self.trace.amsl.max()))
         rise_m, seconds = ways.rise_m, np.zeros(len(way_m))
         if vehicle.energy.base_w:  # it climbs or descends: the slower of both
             each = zip(way_m.tolist(), rise_m.tolist(), speed.tolist(), strict=True)

@@ -4,7 +4,7 @@ The autopilot goes to the nearest of home and its rally points, not to the one t
 RALLY_INCL_HOME 1 and no RALLY_LIMIT_KM (0; by default a point farther than 0.3 km, for planes 5 km, is not used), PX4
 with RTL_TYPE 0. A proposal is judged accordingly: from every part of the mission, to each place that may be nearest
 from there. Of many points the least useful is removed, one by one, as long as that costs little. What the altitude of a
-point means to each autopilot is in `model.RallyAltitude`.
+point means to each autopilot is in `return_rules.RallyAltitude`.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ from gcsplan.check.returns.obstacles import GradedObstacles, Obstacles
 from gcsplan.check.returns.trace import MissionTrace, TraceParts
 
 JudgeParts = Callable[[TraceParts, bool], GradedObstacles]
-"""``judge(parts, whole)``: see `sweep.obstacles_of_returns`."""
+"""``judge(parts, whole)``: see `obstacles.obstacles_of_returns`."""
 
 CLEAR, LEGAL = 0, 1
 FIRST_PIECES = 120_000  # pieces of ground for the first parts, about; sets their size

@@ -11,7 +11,7 @@ import numpy as np
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.check.motion.project import legs_in_plane
 from gcsplan.check.motion.return_rules import RETURN_RULES
-from gcsplan.check.motion.stopping import run_on_m, run_past_m
+from gcsplan.check.motion.stopping import braking_distance_m, run_past_m
 from gcsplan.check.motion.stretch import Flight, Place, Stretch
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.world import World
@@ -165,7 +165,7 @@ def trace_of(flight: Flight, vehicle: Vehicle, world: World, terrain_error_m: fl
             track = float(plane.legs.track_error_m[i:j].max()) - limits.track_error_m
             altitude = float(plane.legs.altitude_error_m[i:j].max()) - limits.altitude_error_m
             if s.reach_m > 0.0 and s.start == s.end:  # a circle, which is left in any direction
-                track += run_on_m(vehicle, s.speed_m_s)
+                track += braking_distance_m(vehicle, s.speed_m_s)
             flown.append((s, points, max(track, 0.0), max(altitude, 0.0)))
     u, along, first, last = [], [], [], []
     at_u = so_far = 0.0
@@ -199,7 +199,7 @@ def trace_of(flight: Flight, vehicle: Vehicle, world: World, terrain_error_m: fl
     past = np.array([_past(flown, number, len(mains), vehicle) for number in kept])
     flown = [flown[number] for number in kept]
     points = np.vstack([p for _, p, _, _ in flown])
-    run = np.array([run_on_m(vehicle, s.speed_m_s) for s, *_ in flown])
+    run = np.array([braking_distance_m(vehicle, s.speed_m_s) for s, *_ in flown])
     return MissionTrace(
         np.concatenate(u), points[:, 0].copy(), points[:, 1].copy(), points[:, 2].copy(), np.concatenate(along),
         np.array(first), np.array(last), np.array([s.seq for s, *_ in flown], dtype=np.intp),

@@ -4,7 +4,7 @@ Each point of a mission has its own straight line home. Parts of the mission are
 part lies within half its length of the return from its middle. The ground is bounded over that line widened by so much,
 with the kernels and margins of the exact check (`gcsplan.world.level_lines`), and zones are compared with the region
 that the returns sweep. Nothing is sampled, so a point reported as safe is safe. A point reported as unsafe is unsafe,
-except: at the ends of a stretch (`refinement.SMALLEST_M`), in safe gaps within a stretch that are shorter than
+except: at the ends of a stretch (`refinement.SMALLEST_PART_M`), in safe gaps within a stretch that are shorter than
 `COARSE_M` (`COARSEST_M` on long missions), and for what the bounds of the ground beside a line cost: the widening times
 the slope there. Apart from that the lowest altitude is at most `LEVEL_M` too high.
 

@@ -62,7 +62,7 @@ def end_in_good_order(*, as_json: bool = False) -> None:
     """Make SIGTERM and SIGHUP end this process as Ctrl-C does: links are closed, unfinished work is undone.
 
     A process that was started to ignore one of them (nohup) continues to ignore it. While a library computes, the
-    process ends at once, with the same message (`signals.Watch`).
+    process ends at once, with the same message (`signals.SignalWatch`).
     """
     if threading.current_thread() is not threading.main_thread():  # Python sets handlers in the main thread only
         return

@@ -68,9 +68,10 @@ class Setting:
     """The value that the proof assumes of a parameter. ``value`` is in the parameter's unit.
 
     ``matters``: what another value changes: the ``time`` (it is judged again, with the separation), the ``pace`` (the
-    time, which no other value can be counted for), where the vehicle ``turns`` (judged again by `check.tuning`, but
-    for the return from anywhere), the ``return`` or the ``flight`` itself (the proof does not hold), or nothing but a
-    ``report``. ``also``: other values that are within the rule, like a 0 that switches it off.
+    time, which no other value can be counted for), where the vehicle ``turns`` (judged again with
+    `turn_parameters.Tuning`, but for the return from anywhere), the ``return`` or the ``flight`` itself (the proof does
+    not hold), or nothing but a ``report``. ``also``: other values that are within the rule, like a 0 that switches it
+    off.
     """
 
     parameter: Parameter

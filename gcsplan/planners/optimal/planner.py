@@ -17,7 +17,7 @@ track can climb to and return from (`altitude_intervals`).
 **Where that does not hold**, under a maximum AGL, or where the climb limit binds far from the ends, paths are searched
 on a lattice of reachable altitudes (`lattice`); the bound from the plane is valid there as well.
 
-Each of these is a module of `searches`, which the governor can choose (`governor`).
+Each search is a module of `searches`; the governor chooses among them (`loop/governor.py`).
 """
 
 from __future__ import annotations

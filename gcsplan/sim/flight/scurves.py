@@ -2,7 +2,7 @@
 
 Each leg is laid out as an S-curve from rest to rest. While it brakes, the autopilot looks at every step whether it may
 begin the next leg: from then on both motions are added. This module steps through the curves; it shares no code with
-`fleet.curved`, which solves for the same motion.
+`gcsplan.fleet.motion.ardupilot.curved`, which solves for the same motion.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The terrain that an ArduPilot vehicle flies over in the terrain frame: its own grid, made of the mission's ground.
 
-The vehicle knows the ground at posts alone, in whole metres, and is bilinear between them (`terrain_grid`). Over a
+The vehicle knows the ground at posts alone, in whole metres, and is bilinear between them (`grid.TerrainGrid`). Over a
 valley or a ridge that is narrower than its posts it flies higher or lower above the ground than it reports.
 """
 

@@ -12,7 +12,7 @@ import pytest
 
 from gcsplan.check.motion.circles import circle_growth
 from gcsplan.check.motion.return_rules import RETURN_RULES, at_home_m, returned
-from gcsplan.check.motion.stopping import about_turn_m, run_on_m, run_past_m
+from gcsplan.check.motion.stopping import about_turn_m, braking_distance_m, run_past_m
 from gcsplan.check.motion.stretch import Place, Stretch, flat_m
 from gcsplan.check.returns.footprint import Target
 from gcsplan.check.returns.obstacles import obstacles_of_returns
@@ -113,16 +113,16 @@ def test_a_copter_stops_where_arducopter_says_and_px4_within_what_was_flown(spee
     v = vehicle(COPTER)
     # get_stopping_point_NE_m: v / p below a / p, else a / 2p² + v² / 2a; a = 2.5, p = 1.
     stops = speed if speed < 2.5 else 1.25 + speed**2 / 5.0
-    assert stops <= run_on_m(v, speed) <= stops + 0.1
-    assert 19.4 <= run_on_m(vehicle(PX4), 10.0) <= 21.0
-    assert run_on_m(replace(v, accel_m_s2=math.inf), speed) == 0.0
-    assert run_on_m(vehicle(PLANE), speed) == 0.0
+    assert stops <= braking_distance_m(v, speed) <= stops + 0.1
+    assert 19.4 <= braking_distance_m(vehicle(PX4), 10.0) <= 21.0
+    assert braking_distance_m(replace(v, accel_m_s2=math.inf), speed) == 0.0
+    assert braking_distance_m(vehicle(PLANE), speed) == 0.0
 
 
 def test_past_a_corner_it_runs_as_far_as_the_speed_in_the_corner_leads() -> None:
     v = vehicle(COPTER)
     assert run_past_m(v, 15.0, None) == 1.25  # a stop
-    assert run_past_m(v, 15.0, 0.0) == run_on_m(v, 15.0)
+    assert run_past_m(v, 15.0, 0.0) == braking_distance_m(v, 15.0)
     past = [run_past_m(v, 15.0, math.radians(turn)) for turn in (0, 30, 60, 90, 120, 150, 180)]
     assert past == sorted(past, reverse=True)
     radius = 2.0 / (math.sqrt(2.0) - 1.0)  # of the arc whose middle is 2 m from a right angle

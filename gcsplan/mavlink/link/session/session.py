@@ -5,7 +5,7 @@
         result.raise_for_outcome()
 
 An upload requires a passing verdict. It runs `preflight`, reads the failsafe parameters, runs `VerifiedUpload` (upload,
-read back, compare), and repeats the caller's check on the list that was read back. The steps are in `tasks`.
+read back, compare), and repeats the caller's check on the list that was read back. The tasks are in `jobs`.
 """
 
 from __future__ import annotations

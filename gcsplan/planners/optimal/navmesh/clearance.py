@@ -28,7 +28,7 @@ Cone = tuple[float, float, float, float]
 """A climb cone, the highest altitudes near an end of a leg: its east_m and north_m, altitude there (m AMSL), slope."""
 
 AROUND = 8
-"""Most nodes on each side of the selected cells that are looked at too: more than `climb_cones.BESIDE`."""
+"""Most nodes on each side of the selected cells that are looked at too: more than `climb_cones.NODES_BESIDE`."""
 RIM_CELLS = 12.0
 """Depth, in cells, to which a zone is looked at that may be too high to climb over so near an end."""
 ALIKE = 12.0

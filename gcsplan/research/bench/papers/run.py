@@ -44,7 +44,7 @@ def run(
         seed: seed from which the seeds of all runs are derived.
         jobs: local processes; None: one for each core. Unused with ``cluster``.
         out: directory of the runs (`PAPER_RUNS_FILE`) and the report; created if missing.
-        cluster: a dask scheduler whose workers do the runs instead (`app.executor`).
+        cluster: a dask scheduler whose workers do the runs instead (`parallel.executor`).
         done: called with the number of finished runs and of all runs.
         missions: directory of the scenarios' mission files; None: the usual folders.
         readings: whether ``algorithms`` None means other readings of the papers, too.
