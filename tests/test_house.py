@@ -356,7 +356,7 @@ MOST_IN_A_FOLDER = 15
 
 MOST = {
     "modules": 460,
-    "statements": 65_220,
+    "statements": 65_279,
     "type names with two meanings": 0,
     "constants with two values": 1,
     "folders with more than 15 modules": 0,

@@ -7,6 +7,7 @@ mission there.
 from __future__ import annotations
 
 import hashlib
+import logging
 import math
 import os
 import time
@@ -30,6 +31,8 @@ except ImportError:  # Windows: every process brings its own copy of a tile
     POSIX = False
 else:
     POSIX = True
+
+_log = logging.getLogger(__name__)
 
 LIST_DAYS = 30.0
 """A list is downloaded anew after this many days."""
@@ -111,7 +114,9 @@ class Fetch:
                 if record is not None and (record.state == "tile" or self._is_new(cell)):
                     return Fetched(cell, record, True)
                 try:
-                    return Fetched(cell, self._bring(cell), False)
+                    brought = self._bring(cell)
+                    _log.info("%s of %s: %s", cell.name, self.source.name, brought.state)
+                    return Fetched(cell, brought, False)
                 except LinkError:
                     if record is None:
                         raise

@@ -6,6 +6,7 @@ Each mistake has its file, its key path, the given value and the required one. T
 
 from __future__ import annotations
 
+import logging
 import os
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
@@ -89,6 +90,8 @@ from gcsplan.world.geodesy.frame import Frame
 from gcsplan.world.geometry.zones import KeepIn
 from gcsplan.world.terrain.model_words import notes_on
 from gcsplan.world.terrain.terrain import OpenTerrain, Terrain, TerrainSpec
+
+_log = logging.getLogger(__name__)
 
 __all__ = ["ArrivalRequest", "MissionFile", "PlannerRequest", "VehicleRequest", "load_mission"]
 
@@ -267,6 +270,7 @@ class _MissionReading:
             hours=hours if left_out_by_hours(published) else None,
             reaching=partial(_reaching, self.content), content=self.content,
         )  # fmt: skip
+        _log.info("%s: %d vehicles, %d zones", self.content.where, len(source.vehicles), len(source.zones))
         return replace(source, wider=partial(site.wider, source), at_level=partial(site.at_level, source))
 
     def zones_alone(self) -> tuple[list[ZoneDraft], list[Note]]:

@@ -6,6 +6,7 @@ import dataclasses
 import doctest
 import inspect
 import json
+import logging
 import pickle
 import re
 import runpy
@@ -375,3 +376,13 @@ def test_terrain_that_is_not_named_is_not_fetched() -> None:
         gcsplan.fetch_dem()
     with pytest.raises(UsageError, match="names such as N36W085"):
         gcsplan.fetch_dem(tiles="X", offline=True)
+
+
+def test_a_plan_logs_its_steps_by_named_loggers_and_sets_none_up(caplog: pytest.LogCaptureFixture) -> None:
+    with caplog.at_level(logging.DEBUG, logger="gcsplan"):
+        plan(load_mission("two.yaml", text=TEXT))
+    said = {(r.name, r.levelname) for r in caplog.records}
+    assert ("gcsplan.mission_file.load", "INFO") in said
+    assert ("gcsplan.planners.optimal.loop.governor", "DEBUG") in said
+    assert "two.yaml: 2 vehicles, 0 zones" in caplog.messages
+    assert not logging.getLogger("gcsplan").handlers

@@ -6,6 +6,7 @@ becomes a mission with its verdict.
 
 from __future__ import annotations
 
+import logging
 import math
 import time
 from collections.abc import Callable, Sequence
@@ -23,6 +24,8 @@ from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.notes.note import Finding, Note
 from gcsplan.planners.budget import FIRST, FIRST_S, Budget
 from gcsplan.planners.problem import Problem, Solution
+
+_log = logging.getLogger(__name__)
 
 SAME_ENDS_M = 1e-6
 """Metres within which two paths end at the same place."""
@@ -69,6 +72,8 @@ def replanned(attempts: Attempts, problem_of: Callable[[Margins], tuple[Problem,
         if not plan.verdict.findings:
             return replace(plan, solution=_of_all(tried), notes=(*notes, *plan.notes))
         findings = on_path(plan.mission, plan.verdict)
+        name, broken = plan.request.vehicle.name, ", ".join(sorted({f.kind for f in plan.verdict.findings}))
+        _log.info("%s: plan %d of %d breaks %s as it is flown", name, len(tried), attempts.most, broken)
         if not findings:
             break  # larger margins cannot cure a battery, a take-off, a landing or a return
         margins = larger(margins, findings, attempts.corner_m)

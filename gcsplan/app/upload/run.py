@@ -9,6 +9,7 @@ slow to import.
 
 from __future__ import annotations
 
+import logging
 import math
 import os
 import re
@@ -50,6 +51,8 @@ if TYPE_CHECKING:
     from gcsplan.mavlink.link.link import Link
     from gcsplan.mavlink.link.session import session
     from gcsplan.mavlink.link.session.results import UploadResult
+
+_log = logging.getLogger(__name__)
 
 LISTEN_S = 1.5
 """Seconds to listen for a second source of a system id's heartbeats, which come once a second."""
@@ -245,6 +248,7 @@ def run_jobs(
             for job in jobs
             if job.name in links and job.name not in barred
         }
+        _log.info("uploading to %s", ", ".join(orders) or "no vehicle")
         results = session.upload_fleet(list(orders.values()), ended=report_end(progress))
         ended = dict(zip(orders, results, strict=True))
         done = [
@@ -258,6 +262,8 @@ def run_jobs(
             )
             for job in jobs
         ]  # fmt: skip
+        for result in done:
+            _log.info("%s: %s", result.vehicle, result.outcome)
         return rolled_back(done, orders, ended) if options.atomic else done
 
 

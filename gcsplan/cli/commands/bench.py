@@ -184,8 +184,11 @@ def bench_swarms(
     evaluations: Annotated[int, typer.Option(metavar="N", help="Paths that each search may try.")] = 10_000,
     method: Annotated[
         list[str] | None,
-        typer.Option("--method", metavar="NAME", help="krill, cmaes, 'mealpy DE', …; repeatable [all]."),
+        typer.Option(
+            "--method", metavar="NAME", help="krill, 'mealpy DE', …, or MODULE:FUNCTION beside them; repeatable [all]."
+        ),
     ] = None,
+    quick: QuickOption = False,
     encodings: Annotated[bool, typer.Option("--encodings", help="Compare encodings instead.")] = False,
     warm: Annotated[bool, typer.Option("--warm", help="Searches around the path of `optimal`, too.")] = False,
     jobs: JobsOption = None,
@@ -201,8 +204,8 @@ def bench_swarms(
     result = swarms.run(
         out,
         seed=seed,
-        count=count,
-        evaluations=evaluations,
+        count=1 if quick else count,
+        evaluations=min(evaluations, 2000) if quick else evaluations,
         names=method,
         encodings=encodings,
         warm=warm,
@@ -249,6 +252,8 @@ def bench_papers(
             "--algorithm", metavar="NAME", help="Run this algorithm or reading (`ssgwo:leaders-all`); repeatable [all]."
         ),
     ] = None,
+    method: OwnOption = None,
+    quick: QuickOption = False,
     runs: Annotated[int | None, typer.Option(metavar="N", help="Runs of each [the paper's number, or 30].")] = None,
     seed: Annotated[int, typer.Option(metavar="N", help="Seed of all runs.")] = 1,
     jobs: JobsOption = None,
@@ -277,9 +282,12 @@ def bench_papers(
         from gcsplan.research.bench.papers import report as papers_report
         from gcsplan.research.bench.papers import run as papers
 
+    if quick:
+        scenario, runs, readings = scenario or ["krill-mound"], min(runs or 2, 2), False
     result = papers.run(
-        scenario or None, algorithm or None, runs, seed, jobs, out, cluster, None, missions=missions, readings=readings
-    )
+        scenario or None, [*(algorithm or ()), *(method or ())] or None, runs, seed, jobs, out, cluster, None,
+        missions=missions, readings=readings,
+    )  # fmt: skip
     files = papers_report.write(result, out)
     if as_json:
         emit(papers.plain(result) | {"files": [str(file) for file in files]})

@@ -58,6 +58,11 @@ class OptimiserResult:
     optimiser: str
 
 
+FIRST_BATCHES = 10
+"""Batches that a rule may yield before its first iteration. One that counts no iterations at all (`Run.cycles`) ends
+after as many batches as it has iterations."""
+
+
 def minimise(  # noqa: PLR0913 - options by name, each with a default
     optimiser: str | OptimiserEntry,
     cost: BatchCost,
@@ -178,6 +183,8 @@ class _Book:
             return "target"
         if ended:
             return "told"
+        if not run.in_cycles and run.iterations is not None and len(self.trace) > max(run.iterations, FIRST_BATCHES):
+            return "iterations"
         return "evaluations" if run.evaluations == run.evaluations_limit else None
 
     def result(self, name: str, stopped_by: StoppedBy) -> OptimiserResult:

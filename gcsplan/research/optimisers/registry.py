@@ -7,10 +7,12 @@ so comparisons should use equal evaluations too.
 
 from __future__ import annotations
 
+import hashlib
 import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
+from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, cast
 
@@ -316,6 +318,14 @@ OPTIMISERS: Mapping[str, OptimiserEntry] = MappingProxyType({entry.name: entry f
 def names() -> tuple[str, ...]:
     """Names of all optimisers, family by family."""
     return tuple(OPTIMISERS)
+
+
+def added_code(name: str) -> str:
+    """Digest of the file of an optimiser that was added; empty for gcsplan's own. Raises InputError as `get` does."""
+    if name in OPTIMISERS:
+        return ""
+    file = inspect.getsourcefile(get(name).rule())
+    return hashlib.sha256(Path(file).read_bytes()).hexdigest()[:16] if file else ""
 
 
 def get(name: str) -> OptimiserEntry:

@@ -120,5 +120,5 @@ SWARM_PLANNERS: Mapping[str, SwarmEntry] = MappingProxyType(
 
 
 def entry(name: str) -> SwarmEntry:
-    """The row of the planner called ``name``, which the table of all planners has."""
-    return SWARM_PLANNERS[name]
+    """The row of the planner called ``name``; of an optimiser that was added, the row of a baseline."""
+    return SWARM_PLANNERS.get(name) or _swarm(name, "", "", _BASELINE)

@@ -228,3 +228,13 @@ def test_clipping_is_in_place() -> None:
     x = np.array([[-0.5, 0.5, 1.5]])
     assert clipped(x) is x
     assert x.tolist() == [[0.0, 0.5, 1.0]]
+
+
+def test_a_rule_that_counts_no_iterations_ends_after_as_many_batches() -> None:
+    def endless(run: Run) -> Steps:
+        while True:
+            yield run.first()
+
+    row = OptimiserEntry("endless", "", endless, "", "", population=5, iterations=20)
+    ended = minimise(row, lambda x: x.sum(axis=1), 2)
+    assert (ended.stopped_by, ended.evaluations) == ("iterations", 21 * 5)

@@ -7,6 +7,7 @@ record.
 
 from __future__ import annotations
 
+import logging
 import math
 import time
 from collections.abc import Sequence
@@ -14,6 +15,8 @@ from collections.abc import Sequence
 from gcsplan.planners.optimal.loop.search import Search
 from gcsplan.planners.optimal.plane.incumbent import Incumbent
 from gcsplan.planners.problem import Step
+
+_log = logging.getLogger(__name__)
 
 LEAST_S = 1e-3
 """Least counted seconds that a search is assumed to cost."""
@@ -41,10 +44,13 @@ def govern(incumbent: Incumbent, searches: Sequence[Search]) -> None:
         chosen.choose()
         if not budget.fits(*size):
             incumbent.steps.append(Step(chosen.NAME, 0.0, size[1], refused=True))
+            _log.debug("%s does not fit into the rest of the budget", chosen.NAME)
             budget.ran_out = True
             continue
         begun, cost, bound = time.perf_counter(), incumbent.cost, incumbent.bound
         chosen.run()
         gained = 0.0 if math.isinf(cost) else 100.0 * (cost - incumbent.cost) / max(cost, 1e-9)
         raised = 100.0 * (incumbent.bound - bound) / max(bound, 1e-9)
-        incumbent.steps.append(Step(chosen.NAME, time.perf_counter() - begun, size[1], gained, raised))
+        took_s = time.perf_counter() - begun
+        incumbent.steps.append(Step(chosen.NAME, took_s, size[1], gained, raised))
+        _log.debug("%s took %.3f s: cost %.6g, bound %.6g", chosen.NAME, took_s, incumbent.cost, incumbent.bound)

@@ -39,7 +39,8 @@ def run(
 
     Args:
         scenarios: names; None: all.
-        algorithms: names of the papers' own algorithms; None: all.
+        algorithms: names of the papers' own algorithms; None: all. An optimiser that was added, by name or
+            ``MODULE:FUNCTION``, searches beside them, in the space of the paper's own algorithm and for its cost.
         runs: runs of each algorithm in each scenario; None: the paper's number (30 if it names none).
         seed: seed from which the seeds of all runs are derived.
         jobs: local processes; None: one for each core. Unused with ``cluster``.
@@ -123,9 +124,9 @@ def _summary(
     scenario: Scenario, prepared: ReadyScenario, names: Sequence[str], found: dict[tuple[str, str], list[RunRecord]]
 ) -> dict[str, Any]:
     """The report's data of a scenario; ``set`` and ``records`` are for its pictures."""
-    own = {c.name for c in scenario.paper.contenders}
-    records = {name: found[scenario.name, name] for name in names if name in own}
-    others = {name: found[scenario.name, name] for name in names if name not in own}
+    readings = {c.name for c in scenario.paper.readings}
+    records = {name: found[scenario.name, name] for name in names if name not in readings}
+    others = {name: found[scenario.name, name] for name in names if name in readings}
     level = equal_evaluations(r for some in records.values() for r in some)
     least = StraightFlight.sum_of(prepared.least)
     energy = prepared.source.vehicles[0].vehicle.energy

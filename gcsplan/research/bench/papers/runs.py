@@ -30,7 +30,8 @@ from gcsplan.planners.problem import Problem
 from gcsplan.planners.registry import get as get_planner
 from gcsplan.planners.simplify import thinned
 from gcsplan.research.bench.papers.scenarios import SCENARIOS, Contender, ReadyScenario, prepare, settings_of
-from gcsplan.research.swarm import SWARM_PLANNERS, aco
+from gcsplan.research.optimisers.registry import added_code
+from gcsplan.research.swarm import aco
 from gcsplan.research.swarm.planner import Found, scene_of, search
 from gcsplan.research.swarm.scene import Scene
 from gcsplan.research.swarm.settings import Settings
@@ -94,12 +95,13 @@ class PaperRun:
         if self.algorithm not in OPTIMA:
             c = self.contender
             parts += [c.planner, {k: dict(v) if isinstance(v, Mapping) else v for k, v in c.options.items()}]
+            parts += [added_code(c.added)] if c.added else []
         return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()[:16]
 
     @property
     def contender(self) -> Contender:
-        """The algorithm's entry in the paper's table."""
-        return next(c for c in SCENARIOS[self.scenario].contenders if c.name == self.algorithm)
+        """The algorithm's entry in the paper's table, or that of an optimiser that was added."""
+        return SCENARIOS[self.scenario].contender(self.algorithm)
 
 
 def key_of(record: RunRecord) -> Key:
@@ -185,7 +187,7 @@ def seed_of(seed: int, number: int, vehicle: int) -> int:
 def _search(problem: Problem, contender: Contender, settings: Settings, scene: Scene) -> Found:
     if contender.planner == "aco":
         return aco.search(problem, settings, scene)
-    return search(problem, SWARM_PLANNERS[contender.planner].optimiser, settings, scene)
+    return search(problem, contender.optimiser, settings, scene)
 
 
 @lru_cache(maxsize=4)

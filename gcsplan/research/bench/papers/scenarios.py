@@ -20,7 +20,9 @@ from gcsplan.mavlink.build.order import Margins
 from gcsplan.mission_file import MissionFile
 from gcsplan.mission_file.source import SAMPLE_FOLDERS
 from gcsplan.planners.problem import Problem
+from gcsplan.plugins import OPTIMISERS_ADDED
 from gcsplan.research.bench.papers.printed import StraightFlight
+from gcsplan.research.optimisers.registry import get as get_optimiser
 from gcsplan.research.swarm import SWARM_PLANNERS
 from gcsplan.research.swarm.settings import Settings
 from gcsplan.world.world import World
@@ -124,11 +126,20 @@ MISSION_FOLDERS = (Path("missions", "papers"), *(folder / "papers" for folder in
 
 @dataclass(frozen=True, slots=True)
 class Contender:
-    """An algorithm of a paper's table: a planner's name, and its options on top of the scenario's mission file."""
+    """An algorithm of a paper's table: a planner's name, and its options on top of the scenario's mission file.
+
+    ``added``: an optimiser that was added, which searches in place of the planner's own.
+    """
 
     name: str
     planner: str
     options: Mapping[str, object] = field(default_factory=lambda: MappingProxyType({}))
+    added: str = ""
+
+    @property
+    def optimiser(self) -> str:
+        """The name of the optimiser that searches."""
+        return self.added or SWARM_PLANNERS[self.planner].optimiser
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,6 +179,11 @@ class Scenario:
     def contenders(self) -> tuple[Contender, ...]:
         """All that run here: the paper's own, and its readings unless this is a twin."""
         return self.paper.contenders if self.twin_of else (*self.paper.contenders, *self.paper.readings)
+
+    def contender(self, name: str) -> Contender:
+        """The contender called ``name``; of an optimiser that was added, in the search space of the paper's own."""
+        own = next((c for c in self.contenders if c.name == name), None)
+        return own or Contender(name, self.paper.contenders[0].planner, added=name)
 
 
 def _merged(options: Mapping[str, object], more: Mapping[str, object]) -> Mapping[str, object]:
@@ -233,17 +249,23 @@ def choose(
     names: Sequence[str] | None, algorithms: Sequence[str] | None, *, readings: bool = True
 ) -> list[tuple[Scenario, list[Contender]]]:
     """The scenarios called ``names`` (None: all), each with its contenders that ``algorithms`` names; None: all, or
-    without ``readings`` the paper's own.
+    without ``readings`` the paper's own. An optimiser that was added, or is at ``MODULE:FUNCTION``, runs in each, too,
+    and chooses none of the others.
 
     Raises InputError for an unknown name, and if nothing is left.
     """
     chosen = _known("scenario", names, SCENARIOS)
     here = {c.name: None for name in chosen for c in SCENARIOS[name].contenders}
-    allowed = _known("algorithm", algorithms, here)
-    if algorithms is None and not readings:
+    added = [a for a in algorithms or () if a not in here and (":" in a or OPTIMISERS_ADDED.get(a) is not None)]
+    own = None if added and len(added) == len(algorithms or ()) else algorithms
+    allowed = _known("algorithm", None if own is None else [a for a in own if a not in added], here)
+    if own is None and not readings:
         allowed = [name for name in allowed if ":" not in name]
+    for name in added:
+        get_optimiser(name)
     picked = [(SCENARIOS[n], [c for c in SCENARIOS[n].contenders if c.name in allowed]) for n in chosen]
-    return [(scenario, contenders) for scenario, contenders in picked if contenders]
+    more = list(dict.fromkeys(added))
+    return [(s, contenders + [s.contender(name) for name in more]) for s, contenders in picked if contenders]
 
 
 def _known(what: str, names: Sequence[str] | None, known: Mapping[str, object]) -> list[str]:

@@ -27,14 +27,17 @@ from gcsplan.bench.measure import length_m, passes, percentile
 from gcsplan.bench.terrain import swarms as terrain_swarms
 from gcsplan.bench.terrain.ompl import release
 from gcsplan.bench.terrain.problems import NamedProblem, problems
-from gcsplan.errors import GcsplanError, InputError
+from gcsplan.errors import GcsplanError, InputError, unknown_name
 from gcsplan.export.table import csv_of
 from gcsplan.planners.budget import Budget
 from gcsplan.planners.problem import Problem, Refusal
 from gcsplan.planners.registry import get as get_planner
+from gcsplan.plugins import OPTIMISERS_ADDED
 from gcsplan.research.bench.papers.runs import code_digest
 from gcsplan.research.optimisers.driver import History, OptimiserResult
-from gcsplan.research.swarm import SWARM_PLANNERS, SwarmEntry, warm_start
+from gcsplan.research.optimisers.registry import added_code
+from gcsplan.research.optimisers.registry import get as get_optimiser
+from gcsplan.research.swarm import SWARM_PLANNERS, SwarmEntry, entry, warm_start
 from gcsplan.research.swarm.planner import Found, cost_of, drawn, search, settle, until_found
 from gcsplan.research.swarm.settings import Settings
 from gcsplan.research.swarm.warm_start import OPTIMAL
@@ -206,11 +209,25 @@ def _release(package: str) -> str:
         return "not installed"
 
 
-def methods(*, encodings: bool = False, warm: bool = False) -> list[Method]:
+def methods(*, encodings: bool = False, warm: bool = False, names: Sequence[str] | None = None) -> list[Method]:
     """The rows of the table; with ``encodings`` the rows of the table that compares encodings.
 
-    ``warm``: searches that begin around the path of `optimal`, too.
+    ``warm``: searches that begin around the path of `optimal`, too. ``names``: labels of the rows; None: all. An
+    optimiser that was added, or is at ``MODULE:FUNCTION``, is one row more, and chooses none of the others. Raises
+    InputError for an unknown name.
     """
+    every = _own_methods(encodings=encodings, warm=warm)
+    known = {m.label for m in every}
+    added = [name for name in names or () if name not in known]
+    for name in added:
+        if ":" not in name and OPTIMISERS_ADDED.get(name) is None:
+            raise unknown_name(f"there is no method {name!r}", name, (*known, *OPTIMISERS_ADDED.names()))
+        get_optimiser(name)
+    chosen = set(names or ()) & known or known
+    return [m for m in every if m.label in chosen] + [Method("gcsplan", name) for name in dict.fromkeys(added)]
+
+
+def _own_methods(*, encodings: bool, warm: bool) -> list[Method]:
     if encodings:
         return [Method("gcsplan", name, encoding)
                 for encoding in COMPARED_ENCODINGS for name in (*PAPER_SWARMS, "lshade")
@@ -234,17 +251,13 @@ def run(
 ) -> SwarmsResult:
     """Measure, and write ``swarms.md`` and ``swarms.csv`` to ``directory``.
 
-    ``count``: missions of each group; ``names``: labels of methods; None: all. ``encodings``: compare encodings
-    instead; ``warm``: with warm starts; ``jobs``: see `parallel.executor`. Attempts are kept in the directory, and the
-    same command goes on there. Raises InputError for an unknown name, and if mealpy or cma is not installed.
+    ``count``: missions of each group; ``names``, ``encodings``, ``warm``: see `methods`; ``jobs``: see
+    `parallel.executor`. Attempts are kept in the directory, and the same command goes on there. Raises InputError for an
+    unknown name, and if mealpy or cma is not installed.
     """
     if evaluations < 1 or (count is not None and count < 1):
         raise InputError("evaluations and count must be 1 or more")
-    known = list(dict.fromkeys(m.label for m in methods(encodings=encodings, warm=warm)))
-    for name in names or ():
-        if name not in known:
-            raise InputError(f"the methods are {', '.join(known)}, given {name!r}")
-    chosen = [m for m in methods(encodings=encodings, warm=warm) if names is None or m.label in names]
+    chosen = methods(encodings=encodings, warm=warm, names=names)
     if any(m.family == "mealpy" for m in chosen):
         release("mealpy")
     named = problems("room", seed, count=count)
@@ -281,7 +294,9 @@ class SwarmJob:
     @property
     def key(self) -> str:
         """All that decides the answer, the code included."""
-        return f"{self.seed} {self.evaluations} {self.mission} {self.method} {code_digest()}"
+        added = self.method and self.method.family == "gcsplan" and self.method.name not in SWARM_PLANNERS
+        code = f" {added_code(self.method.name)}" if self.method and added else ""
+        return f"{self.seed} {self.evaluations} {self.mission} {self.method} {code_digest()}{code}"
 
 
 class Kept:
@@ -332,7 +347,7 @@ def attempt_of(one: NamedProblem, method: Method, evaluations: int) -> Attempt:
     if method.warm:
         options["warm_start"] = OPTIMAL
     ours = method.family == "gcsplan"
-    row = SWARM_PLANNERS[method.name if ours else "de"]
+    row = entry(method.name if ours else "de")
     settings = replace(Settings.of(row, options), iterations=None, evaluations=evaluations)
     settings = warm_start.resolved(problem, settings)
     began = time.process_time()

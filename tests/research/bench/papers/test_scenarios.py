@@ -48,3 +48,15 @@ def test_unknown_names_are_refused_with_the_nearest() -> None:
     assert [c.name for c in choose(["abo", SCENARIO], ["pso"])[0][1]] == ["pso"]
     with pytest.raises(InputError, match=re.escape("abo.yaml is in none of")):
         mission_text("abo", Path("nowhere"))
+
+
+def test_an_added_optimiser_runs_in_the_space_of_the_papers_own_algorithm() -> None:
+    place = "gcsplan.research.optimisers.classics:de"
+    [(scenario, contenders)] = choose(["ssgwo-table3"], ["gwo", place])
+    assert [c.name for c in contenders] == ["gwo", place]
+    ready = prepare(scenario.name, mission_text(scenario.name))
+    assert settings_of(contenders[1], ready.source) == settings_of(scenario.contender("ssgwo"), ready.source)
+    assert (contenders[1].optimiser, scenario.contender("gwo").optimiser) == (place, "gwo")
+    assert [len(c) for _, c in choose(["krill-mound"], [place], readings=False)] == [4]
+    with pytest.raises(InputError, match="there is no algorithm 'gradient' here"):
+        choose(None, ["gradient"])

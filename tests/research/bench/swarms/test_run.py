@@ -14,8 +14,30 @@ from gcsplan.research.bench.swarms.run import Attempt, Method, Optimum, SwarmsRe
 
 
 def test_a_method_that_does_not_exist_is_refused_with_the_known_ones(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="krill, ssgwo, msfoa, abo, ib-abc, lshade, cmaes, mealpy DE"):
+    with pytest.raises(InputError, match="there is no method 'gradient'"):
         swarms.run(tmp_path, names=["gradient"])
+    with pytest.raises(InputError, match="no module nowhere"):
+        swarms.run(tmp_path, names=["nowhere:rule"])
+
+
+def test_an_added_optimiser_is_one_row_beside_all_or_beside_the_named_ones() -> None:
+    place = "gcsplan.research.optimisers.classics:de"
+    every = swarms.methods()
+    assert swarms.methods(names=[place]) == [*every, Method("gcsplan", place)]
+    assert [m.label for m in swarms.methods(names=["krill", place, place])] == ["krill", place]
+
+
+def test_kept_attempts_of_an_added_optimiser_count_while_its_file_is_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "kept_rule.py"
+    file.write_text("def rule(run):\n    yield run.first()\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    job = swarms.SwarmJob(1, 10, "m", Method("gcsplan", "kept_rule:rule"))
+    before = job.key
+    assert job.key == before
+    file.write_text("def rule(run):\n    yield run.first()  # another\n")
+    assert job.key != before
 
 
 @pytest.mark.slow
