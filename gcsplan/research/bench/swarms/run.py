@@ -252,8 +252,8 @@ def run(
     """Measure, and write ``swarms.md`` and ``swarms.csv`` to ``directory``.
 
     ``count``: missions of each group; ``names``, ``encodings``, ``warm``: see `methods`; ``jobs``: see
-    `parallel.executor`. Attempts are kept in the directory, and the same command goes on there. Raises InputError for an
-    unknown name, and if mealpy or cma is not installed.
+    `parallel.executor`. Attempts are kept in the directory, and the same command goes on there. Raises InputError for
+    an unknown name, and if mealpy or cma is not installed.
     """
     if evaluations < 1 or (count is not None and count < 1):
         raise InputError("evaluations and count must be 1 or more")
