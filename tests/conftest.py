@@ -34,7 +34,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def keep_byte_code(folder: Path) -> None:
-    """Let workers and commands keep byte code in this folder, where ``PYTHONDONTWRITEBYTECODE`` keeps it off the sources.
+    """Let workers and commands keep byte code in this folder, where ``PYTHONDONTWRITEBYTECODE`` bars it beside sources.
 
     Without byte code each worker rewrites all test files, which takes three times as long as to read them, and each
     command compiles the whole package that it imports.

@@ -195,6 +195,7 @@ def test_what_the_exact_check_passes_below_the_cap_is_free_in_the_mesh_for_bound
     assert passed > 30
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("limits", LIMITS)
 @pytest.mark.parametrize("world", ["hills", "amsl", "tall", "lids"])
 def test_ways_in_the_mesh_for_paths_pass_the_exact_check(world: str, limits: str) -> None:
