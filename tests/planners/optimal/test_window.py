@@ -394,7 +394,7 @@ def test_campaign_of_worlds(family: str, seed: int) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.nightly_but("101-ridge", "100-tiles", "101-edge")
+@pytest.mark.nightly_but("100-tiles", "101-edge")
 @pytest.mark.parametrize("family", ["ridge", "tiles", "edge"])
 @pytest.mark.parametrize("seed", range(100, 106))
 def test_campaign_of_worlds_longer(family: str, seed: int) -> None:
