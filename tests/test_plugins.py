@@ -61,6 +61,7 @@ def installed(folder: Path) -> None:
     (info / "entry_points.txt").write_text("\n".join(points), encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_the_package_of_the_documents_is_found_and_run(tmp_path: Path) -> None:
     installed(tmp_path)
     (tmp_path / "some.discs").write_text("36.6 -84.2955 60\n", encoding="utf-8")

@@ -136,6 +136,7 @@ def test_durations_that_are_none_or_negative() -> None:
     assert [duration(v) for v in (None, math.inf, math.nan, -0.2, -61.0)] == ["–", "–", "–", "0:00:00", "-0:01:01"]
 
 
+@pytest.mark.slow
 def test_units_by_name() -> None:
     with pytest.raises(UsageError, match=r"units must be metric, imperial, aviation, given 'furlong'"):
         report(planned()[0], way_home=False, units="furlong")  # type: ignore[arg-type]
@@ -171,6 +172,7 @@ def page_words(page: str) -> str:
     return "\n".join(line for line in words.splitlines() if line.strip())
 
 
+@pytest.mark.first_quick
 @systems
 def test_the_chart_of_separations_names_the_exact_least_distance(units: Units) -> None:
     """The curve's samples may miss it by some centimetres, which feet show."""
@@ -184,7 +186,7 @@ def test_the_chart_of_separations_names_the_exact_least_distance(units: Units) -
     assert re.findall(r'class="mark tight".*?<b>([^<]*)</b>', chart) == [exact]
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("units", [IMPERIAL, AVIATION], ids=["imperial", "aviation"])
 def test_every_number_of_the_report_is_the_same_in_every_system(units: Units) -> None:
     done, homes = planned()
@@ -327,6 +329,7 @@ def test_check_says_the_same_in_every_system(run: Any, units: Units, mission: st
     assert not re.search(r"\d (m|km|m/s)\b(?! \(|\)|,| or)", re.sub(r"RTL_ALT_M \d+ \(m\)", "", told_so))
 
 
+@pytest.mark.slow
 def test_json_and_files_are_in_si_in_every_system(run: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     _, out, _ = run("check", "higher.yaml", "a.plan", "--way-home", "--json")
     monkeypatch.setenv("GCSPLAN_UNITS", "imperial")

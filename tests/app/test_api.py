@@ -101,6 +101,7 @@ def test_the_functions_are_at_the_front_door_and_cost_nothing_until_used() -> No
     assert (Path(gcsplan.__file__).parent / "py.typed").exists()
 
 
+@pytest.mark.slow
 def test_help_shows_every_function_with_its_arguments() -> None:
     text = run("import pydoc, gcsplan; print(pydoc.render_doc(gcsplan, renderer=pydoc.plaintext))")
     functions = text.split("\nFUNCTIONS")[1]
@@ -108,7 +109,7 @@ def test_help_shows_every_function_with_its_arguments() -> None:
     assert [name.strip() for name in shown] == NAMES
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.nightly_but("gcsplan.check.verdict", "gcsplan")
 @pytest.mark.parametrize("first", ["gcsplan.check.verdict", "gcsplan.report.page", "gcsplan.cli.main", "gcsplan"])
 def test_check_and_report_are_functions_whatever_was_imported_before(first: str) -> None:
@@ -233,6 +234,7 @@ def doubtful(cross: Plan) -> Plan:
     return dataclasses.replace(cross, vehicles=(unjudged,), fleet=None)
 
 
+@pytest.mark.slow
 def test_a_report_is_text_and_is_written_where_that_is_asked_for(cross: Plan, tmp_path: Path) -> None:
     text = gcsplan.report(cross, tmp_path / "page.html")
     assert (tmp_path / "page.html").read_text(encoding="utf-8") == text
@@ -260,6 +262,7 @@ def test_a_plan_is_uploaded_to_one_port_to_a_link_each_and_to_simulated_vehicles
     assert told.count("verified") == 2
 
 
+@pytest.mark.slow
 def test_a_failure_raises_nothing_and_is_told_and_all_or_nothing_takes_back(cross: Plan) -> None:
     with SimServer(boards(cross, south={"refuse": 2}), "udpin:127.0.0.1:0", speedup=10.0) as server:
         west, south = upload(cross, server.url_for_gcs)
@@ -280,6 +283,7 @@ def test_what_is_no_target_or_not_safe_is_refused_before_anything_is_sent(cross:
     assert upload(doubtful(cross), "sim", allow_unjudged=True)[0].verified
 
 
+@pytest.mark.slow
 def test_a_rehearsal_flies_the_plan_and_finds_its_arrivals(cross: Plan) -> None:
     flown = rehearse(cross)
     assert flown.safe is True, flown.breaches
@@ -295,6 +299,7 @@ def test_a_rehearsal_flies_the_plan_and_finds_its_arrivals(cross: Plan) -> None:
     assert windy.p95_s is not None
 
 
+@pytest.mark.slow
 def test_the_example_uploads_a_fleet(cross: Plan, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "cross.yaml"
     file.write_text(TEXT)
@@ -310,6 +315,7 @@ def test_the_example_uploads_a_fleet(cross: Plan, tmp_path: Path, capsys: pytest
     assert main(str(tmp_path / "none.yaml"), "sim") == 2
 
 
+@pytest.mark.slow
 def test_a_plan_survives_pickling_and_gives_the_same_bytes(cross: Plan, tmp_path: Path) -> None:
     again = pickle.loads(pickle.dumps(cross))
     assert {name: v.safe for name, v in gcsplan.check(again).items()} == {v.name: True for v in cross.vehicles}
@@ -338,6 +344,7 @@ def test_a_plans_documents_are_those_of_its_files(cross: Plan, tmp_path: Path) -
     assert cross.to_geojson() == json.loads((tmp_path / "mission.geojson").read_text(encoding="utf-8"))
 
 
+@pytest.mark.slow
 def test_a_mission_on_board_is_verified_downloaded_and_cleared(cross: Plan, tmp_path: Path) -> None:
     one = cross.vehicles[0]
     write(cross, tmp_path)

@@ -49,6 +49,7 @@ def test_every_mission_has_its_record_and_its_outputs(folder: Path, tmp_path: Pa
     assert "no-fly zone 'disc'" in records["shut"].rows[0]["message"]
 
 
+@pytest.mark.slow
 def test_what_is_unchanged_is_kept(folder: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     before, _ = ran(folder, out)

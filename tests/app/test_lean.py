@@ -68,6 +68,7 @@ def commanded(done: Plan) -> list[float]:
     return [item.params[1] for item in done.vehicles[0].mission.items if item.command == 178]
 
 
+@pytest.mark.slow
 def test_without_a_lean_angle_a_copter_is_planned_at_what_the_default_allows() -> None:
     done = planned()
     assert commanded(done) == [10.0]
@@ -115,6 +116,7 @@ def test_a_lean_angle_that_arducopter_does_not_take_is_a_mistake(lean_deg: objec
         load_mission(text=text_of(lean_angle_deg=lean_deg))
 
 
+@pytest.mark.slow
 def test_the_shipped_missions_lean_as_far_as_their_speeds_need() -> None:
     for file in MISSIONS.glob("*.yaml"):
         wanted = {v["name"]: v["speed_m_s"][1] for v in yaml.safe_load(file.read_text())["vehicles"]}

@@ -79,6 +79,7 @@ def quickly(monkeypatch: pytest.MonkeyPatch) -> None:
     be_impatient(monkeypatch)
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize(("autopilot", "version"), NAMES)
 def test_an_ordinary_vehicle_of_each_version_is_accepted(
     monkeypatch: pytest.MonkeyPatch, autopilot: Autopilot, version: tuple[int, int]

@@ -45,6 +45,7 @@ def test_the_sentence_names_what_was_judged(path: bool | None, home: Any, said: 
     assert str(verdict_words(path, home)) == said
 
 
+@pytest.mark.slow
 def test_table_json_kml_and_report_tell_the_same_sentence(capsys: pytest.CaptureFixture[str]) -> None:
     done = plan(load_mission(DATA / "crossing.yaml"))
     homes = homes_of(done)
@@ -61,6 +62,7 @@ def test_table_json_kml_and_report_tell_the_same_sentence(capsys: pytest.Capture
         assert ">SAFE<" not in page
 
 
+@pytest.mark.slow
 def test_a_batch_tells_in_index_and_csv_what_its_pages_tell(tmp_path: Path) -> None:
     for report, ends in ((False, "return not judged"), (True, "of it")):
         out = tmp_path / str(report)
@@ -77,6 +79,7 @@ def test_a_batch_tells_in_index_and_csv_what_its_pages_tell(tmp_path: Path) -> N
         assert row["max_agl_m"] > row["min_agl_m"]
 
 
+@pytest.mark.slow
 def test_without_an_energy_key_no_output_tells_an_energy(capsys: pytest.CaptureFixture[str]) -> None:
     for energy, told in ((None, False), (ENERGY, True)):
         done = plan(load_mission(mission(energy)))
@@ -90,6 +93,7 @@ def test_without_an_energy_key_no_output_tells_an_energy(capsys: pytest.CaptureF
         assert ("<dt>energy</dt><dd>–" in report_of(done)) is not told
 
 
+@pytest.mark.slow
 def test_a_battery_without_energy_is_judged_by_the_papers_numbers_and_says_so(
     capsys: pytest.CaptureFixture[str],
 ) -> None:

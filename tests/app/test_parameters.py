@@ -86,6 +86,7 @@ RTL = {"end": "rtl", "rtl_rel_home_m": 60}
 # -- silence is no default -------------------------------------------------------------------------------------------
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize(
     ("vehicle", "parameters", "name", "way_home"),
     [
@@ -129,6 +130,7 @@ def test_verify_does_not_take_silence_for_a_default(tmp_path: Any) -> None:
 # -- what differs is judged again ------------------------------------------------------------------------------------
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize(
     ("vehicle", "parameters", "words"),
     [

@@ -65,6 +65,7 @@ def planned(file: Path) -> Plan:
 # -- the built-in simulator -----------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_planned_fleet_arrives_within_half_a_second_of_its_plan_in_order_and_apart(planned: Plan) -> None:
     terms = terms_of(planned)
     assert (terms.order, terms.separation_m) == (("uav3", "uav1", "uav2"), 30.0)
@@ -216,6 +217,7 @@ def one(planned: Plan) -> list[RehearsalPart]:
     return parts_of(planned)[:1]
 
 
+@pytest.mark.slow
 def test_what_is_no_simulator_is_never_armed(planned: Plan, monkeypatch: pytest.MonkeyPatch) -> None:
     parts = one(planned)
     with (
@@ -225,6 +227,7 @@ def test_what_is_no_simulator_is_never_armed(planned: Plan, monkeypatch: pytest.
         rehearse_sitl(parts, planned.world, Terms(), seats)
 
 
+@pytest.mark.slow
 def test_a_vehicle_that_will_not_arm_is_given_up_with_its_own_words(
     planned: Plan, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -284,7 +287,7 @@ class TwoAtOnce(Inline):
             yield number, pickle.loads(pickle.dumps(sent[0](*sent[1:])))
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("runs", [2, 7])
 def test_whoever_flies_the_runs_the_result_is_the_same(planned: Plan, monkeypatch: Any, runs: int) -> None:
     """Strong noise, so that limits are broken in some runs and the order is lost in some."""

@@ -46,6 +46,7 @@ def figures(planned: Plan) -> tuple[object, ...]:
     return tuple(tuple(item.wire for item in v.mission.items) for v in planned.vehicles)
 
 
+@pytest.mark.slow
 def test_a_changed_session_writes_the_bytes_of_the_command_line(tmp_path: Path) -> None:
     session = Planner("sample:fleet-4")
     session.change({"vehicles[0].goal": session.mission["vehicles"][0]["start"], "vehicles.uav2.max_climb_deg": 40})
@@ -132,6 +133,7 @@ def test_what_is_no_mission_is_told_at_once(wrong: Any) -> None:
         Planner(LEGS).change([("a", 1)])  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_each_path_is_better_than_the_one_before_and_each_bound_holds() -> None:
     paths: list[BetterPath] = []
     bounds: list[float] = []
@@ -160,6 +162,7 @@ def test_what_a_callback_raises_ends_the_plan_and_not_the_session() -> None:
     assert session.plan().vehicles[0].verdict.safe
 
 
+@pytest.mark.slow
 def test_a_cancelled_plan_ends_soon_and_the_next_one_is_whole() -> None:
     session = Planner("sample:jacksboro")
     whole = figures(session.plan())
@@ -253,6 +256,7 @@ def run_threads(threads: int, changes: int) -> None:
         assert got == figures(alone.plan(changes_of(k, n)))
 
 
+@pytest.mark.slow
 def test_threads_get_the_plans_that_they_would_get_alone() -> None:
     run_threads(6, 3)
 

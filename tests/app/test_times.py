@@ -94,6 +94,7 @@ def test_table_json_csv_and_report_say_the_same_times(case: str) -> None:
         assert {seq: at for seq, at in in_kml.items() if seq in until} == pytest.approx(until, abs=0.0501)
 
 
+@pytest.mark.first_quick
 @cases
 def test_the_check_of_the_written_file_says_the_same_times(case: str, tmp_path: Path) -> None:
     source, done = planned(case)
@@ -109,6 +110,7 @@ def test_the_check_of_the_written_file_says_the_same_times(case: str, tmp_path: 
             assert times == pytest.approx([leg.time_s for leg in v.verdict.legs], abs=1e-3)
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize(
     "case", [pytest.param(name, marks=[] if name in FLOWN_QUICKLY else [pytest.mark.slow]) for name in CASES]
 )
@@ -125,6 +127,7 @@ def test_a_rehearsal_compares_with_the_planned_time(case: str) -> None:
         assert performance.arrive_s[0] == pytest.approx(slot.arrive_s, rel=0.01, abs=0.5)
 
 
+@pytest.mark.slow
 def test_a_wait_until_a_time_of_day_counts_in_every_output() -> None:
     source = load_mission("times.yaml", text=yaml.safe_dump(CASES["a hold at the gate"]))
     done = plan(source, gate_utc=datetime(2026, 3, 1, 12, 0, tzinfo=UTC))

@@ -49,6 +49,7 @@ def kinds(planner: Planner, family: str, seed: int, most: int) -> set[str]:
     return {f.kind for f in tally.faults}
 
 
+@pytest.mark.slow
 def test_a_bound_that_is_raised_by_a_ten_thousandth_is_found() -> None:
     """The planted bound lies just below the plan's own cost: only a witness shows that it is wrong."""
     assert kinds(raised(lambda v: v.cost * (1.0 - 1e-6)), "walls", 2, 60) == {"undercut"}
@@ -59,10 +60,12 @@ def test_a_bound_above_the_plans_own_cost_is_found() -> None:
     assert kinds(raised(lambda v: v.cost * (1.0 + 1e-6)), "walls", 2, 1) & {"own cost", "crash"}
 
 
+@pytest.mark.slow
 def test_a_false_proof_is_found_by_a_way_past_the_walls() -> None:
     assert "proved" in kinds(refused("there is no path within the limits, which is proved"), "walls", 1, 60)
 
 
+@pytest.mark.slow
 def test_a_refusal_that_does_not_name_unknown_ground_is_found() -> None:
     seed = 2
     words = "there is no path within the limits, which is proved"
@@ -92,6 +95,7 @@ FOUND = [
 ]
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize(("family", "seed"), FOUND)
 def test_what_the_campaign_found_once_is_cured(family: str, seed: int) -> None:
     tally = run(FOREVER_S, seed, (family,), worlds=1, most=60)

@@ -37,6 +37,7 @@ def upside_down(spec: TerrainSpec, frame: Frame) -> Surface:
 PLANTED = [(of_one_height, 1), (with_zeros, 22), (upside_down, 104), (feet_as_metres, 3)]
 
 
+@pytest.mark.slow
 def test_heights_are_read_as_the_files_state_them() -> None:
     tally = run(FOREVER_S, 1000, most=14)
     assert tally.faults == []

@@ -12,6 +12,7 @@ from gcsplan.mission_file.published import times
 from tests.campaigns import hours
 
 
+@pytest.mark.slow
 def test_some_inputs_of_the_campaign_find_nothing(tmp_path: Path) -> None:
     assert [hours.attack(seed, tmp_path)[1] for seed in range(900, 930)] == [[]] * 30
 
@@ -21,6 +22,7 @@ def test_the_campaign_finds_an_end_that_misses_its_day(tmp_path: Path, monkeypat
     assert any(hours.attack(seed, tmp_path)[1] for seed in range(130, 210))
 
 
+@pytest.mark.slow
 def test_the_campaign_finds_flights_that_outlast_the_hours(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(check_sites, "beyond_hours", lambda *_: "")
     found = [fault for seed in range(1, 60) for fault in hours.attack(seed, tmp_path)[1]]

@@ -50,6 +50,7 @@ def test_no_family_is_unsafe_at_the_limit() -> None:
     assert set(tally.judged) == set(FAMILIES)
 
 
+@pytest.mark.slow
 def test_corners_that_nobody_judges_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
     def sharp(*_: object) -> None:
         """Replace `round_corners`: no corner is cut."""

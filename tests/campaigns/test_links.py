@@ -24,6 +24,7 @@ def test_nothing_is_found_among_adversaries() -> None:
     assert counts["changed"] > 3
 
 
+@pytest.mark.slow
 def test_the_campaign_finds_an_upload_that_does_not_look_again(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Recheck, "gate", lambda self, now: None)
     found = [words for seed in (13, 109, 128, 143) for words in campaign(range(seed, seed + 1))[1]]
@@ -37,6 +38,7 @@ def fewer_parameters(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(PARAMETER_GROUPS, Autopilot.PX4, groups[: groups.index(("NAV_MC_ALT_RAD",)) + 1])
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("fewer_parameters")
 def test_seeds_that_found_something_once_find_nothing() -> None:
     """Twins with another component id at one address (first six seeds), a twin that came between an upload and the

@@ -36,6 +36,7 @@ def test_the_campaign_finds_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert "ZeroDivisionError" in found(tmp_path, "csv")
 
 
+@pytest.mark.slow
 def test_the_campaign_finds_a_zone_that_moves_with_another_s_damage(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

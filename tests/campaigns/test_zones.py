@@ -13,10 +13,12 @@ from gcsplan.world.geodesy import degree_shapes
 from tests.campaigns import zone_shapes, zones
 
 
+@pytest.mark.slow
 def test_some_inputs_of_the_campaign_find_nothing(tmp_path: Path) -> None:
     assert [zones.attack(seed, tmp_path)[2] for seed in range(400, 412)] == [[]] * 12
 
 
+@pytest.mark.slow
 def test_some_circles_corridors_and_projected_polygons_find_nothing(tmp_path: Path) -> None:
     assert [zone_shapes.attack(seed, tmp_path)[2] for seed in range(700, 708)] == [[]] * 8
 

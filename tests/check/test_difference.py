@@ -43,6 +43,7 @@ def test_a_leg_moved_as_far_as_brute_force_over_both_lines_finds() -> None:
         assert brute - WITHIN_M - 1e-6 <= found <= brute + step_m + 1e-6
 
 
+@pytest.mark.slow
 def test_a_long_line_that_is_shifted_as_a_whole_takes_no_time() -> None:
     corners = np.cumsum(np.tile([[300.0, 40.0, 2.0]], (1500, 1)), axis=0)
     old = np.stack([corners[:-1], corners[1:]], axis=1)

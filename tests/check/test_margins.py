@@ -79,7 +79,7 @@ def brute(done: Any) -> tuple[float, list[tuple[float, float]]]:
     return most, places
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("zone", "side"),
     [

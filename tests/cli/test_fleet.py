@@ -49,6 +49,7 @@ def test_one_line_plans_uploads_verifies_and_tells_when_to_start_whom(run: Any, 
     assert upload["fleet"]["order"] == ["west", "south"]
 
 
+@pytest.mark.slow
 def test_json_names_who_refused_and_whose_mission_was_withdrawn(run: Any, tmp_path: Path) -> None:
     with SimServer(boards(south={"refuse": 2}), "udpin:127.0.0.1:0", speedup=10.0) as server:
         code, out, _ = run("plan", write(tmp_path), "--upload", server.url_for_gcs, "--atomic", "--json")

@@ -35,6 +35,7 @@ def tiles(tmp_path: Path) -> Path:
     return tmp_path
 
 
+@pytest.mark.slow
 def test_plan_check_and_report_say_it_in_one_line(run: Any, tiles: Path) -> None:
     line = "heights: feet, from the file; EGM96; ground 304–305 m AMSL"
     code, _, err = run("plan", mission(tiles, "vertical_datum: EGM96"), "-o", "o", "--report")
@@ -51,6 +52,7 @@ def test_plan_check_and_report_say_it_in_one_line(run: Any, tiles: Path) -> None
     assert told["inputs"]["heights_read"] == line.removeprefix("heights: ")
 
 
+@pytest.mark.slow
 def test_the_options_count_before_the_mission_and_the_file(run: Any, tiles: Path) -> None:
     plain = mission(tiles, "vertical_datum: EGM96")
     code, _, err = run("plan", plain, "-o", "o", "--height-unit", "m", "--vertical-datum", "NAVD88")
@@ -81,6 +83,7 @@ def test_new_writes_them_into_the_mission(run: Any, tiles: Path) -> None:
     assert "\n  nodata: 0\n" in text
 
 
+@pytest.mark.slow
 def test_a_void_of_zeros_is_named_where_it_leaves_no_mission(run: Any, tiles: Path) -> None:
     heights = FEET.copy()
     heights[:, 58:60] = 0.0

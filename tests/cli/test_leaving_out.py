@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+import pytest
 import yaml
 
 from tests.app.plan.test_left_out import GOOD, SHUT, WEAK, mission
@@ -37,6 +38,7 @@ def test_the_command_names_them_writes_the_others_and_ends_with_three(run: Any, 
     assert code == 2
 
 
+@pytest.mark.slow
 def test_a_rehearsal_flies_the_others_and_ends_with_three(run: Any, tmp_path: Path) -> None:
     file = tmp_path / "four.yaml"
     file.write_text(yaml.safe_dump(mission(GOOD[0], SHUT, GOOD[1], leave_out=True)))

@@ -10,6 +10,7 @@ import pytest
 NAME = "sample:papers/krill-mound"
 
 
+@pytest.mark.slow
 def test_a_sample_is_planned_into_a_directory_of_its_name_and_checked(run: Any, tmp_path: Path) -> None:
     code, out, _ = run("plan", NAME)
     assert code == 0

@@ -104,6 +104,7 @@ def test_a_return_that_is_required_decides_the_same_way_in_every_command(
     assert "warning" not in text
 
 
+@pytest.mark.slow
 def test_a_batch_writes_no_mission_without_the_safe_return_that_its_file_requires(run: Any, tmp_path: Path) -> None:
     missions = [write(tmp_path, name, way_home="required", **more) for name, more in LOW_AND_HIGH.items()]
     code, text, _ = run("batch", *missions, "-o", "out", "--report")
@@ -115,6 +116,7 @@ def test_a_batch_writes_no_mission_without_the_safe_return_that_its_file_require
     assert told["vehicles"][0]["way_home"]["safe"] is True
 
 
+@pytest.mark.slow
 def test_who_has_no_safe_return_is_left_out_where_vehicles_may_be(run: Any, tmp_path: Path) -> None:
     beside = UAV1 | {
         "name": "uav2", "sysid": 2, "start": {"east_m": 0, "north_m": 400}, "goal": {"east_m": 2000, "north_m": 400},
@@ -188,6 +190,7 @@ def test_where_a_safe_return_is_required_nothing_flyable_is_left_and_nothing_is_
     assert not flyable(tmp_path / "script")
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("way", ["plan", "upload"])
 def test_a_vehicle_with_another_return_altitude_is_refused_before_anything_is_sent(
     run: Any, tmp_path: Path, planned: Path, way: str
@@ -206,7 +209,7 @@ def test_a_vehicle_with_another_return_altitude_is_refused_before_anything_is_se
         )
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("told", [{}, {"RTL_ALT": math.nan}], ids=["nothing", "no number"])
 def test_a_vehicle_that_hides_its_return_altitude_gets_no_mission_that_requires_one(
     run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, told: dict[str, float]
@@ -224,6 +227,7 @@ def test_a_vehicle_that_hides_its_return_altitude_gets_no_mission_that_requires_
         assert "WPNAV_RADIUS or WP_RADIUS_M" in text
 
 
+@pytest.mark.slow
 def test_an_rtl_item_is_judged_at_the_altitude_of_the_vehicle_before_it_is_sent(run: Any, tmp_path: Path) -> None:
     # The mission itself returns over the hill. At 15 m above home, as the vehicle is set, it would meet it.
     mission = tmp_path / "back.yaml"
@@ -247,6 +251,7 @@ def test_what_was_judged_is_not_called_unchecked_and_the_vehicles_own_name_is_to
     assert f"the return is at 15 m above home (RTL_ALT), as judged: set RTL_ALT {value:.0f} (cm)\n" in text
 
 
+@pytest.mark.slow
 def test_the_value_that_is_told_to_set_makes_the_return_safe(run: Any, tmp_path: Path) -> None:
     assert run("plan", write(tmp_path), "--way-home")[0] == 0
     told = json.loads((tmp_path / "hill" / "summary.json").read_text())["vehicles"][0]["way_home"]

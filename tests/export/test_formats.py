@@ -394,6 +394,7 @@ def test_a_zone_across_the_antimeridian_becomes_two_polygons_of_the_same_area() 
 # -- summary.json -------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_json_is_that_of_the_library_and_takes_little_more_than_its_text() -> None:
     """A mission that is flown around for 100,000 items took a gigabyte, most of it for commas and numbers in a list."""
     value = {"legs": [{"leg": i, "length_m": 0.5 * i, "what": "Übung", "none": None} for i in range(5_000)]}

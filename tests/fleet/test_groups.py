@@ -35,6 +35,7 @@ def test_groups_are_the_clusters() -> None:
     assert sorted(map(sorted, groups_of(plan, RULES))) == [[f"c{c}v{k}" for k in range(4)] for c in range(3)]
 
 
+@pytest.mark.slow
 @pytest.mark.nightly_but("0", "1")
 @pytest.mark.first_quick
 @pytest.mark.parametrize("seed", range(4))
@@ -55,6 +56,7 @@ def test_group_by_group_is_the_same_as_all_at_once(seed: int) -> None:
     assert judged.safe
 
 
+@pytest.mark.slow
 def test_groups_that_meet_after_all_are_joined(monkeypatch: pytest.MonkeyPatch) -> None:
     crews = clusters(2)
     plan = schedule(crews, "sequence", interval_s=1.0)

@@ -400,6 +400,7 @@ def made_fleet(count: int, seed: int, side_m: float, legs: int = 6) -> list[Crew
     return out
 
 
+@pytest.mark.slow
 @settings(max_examples=draws(12), phases=[Phase.explicit, Phase.generate])
 @given(st.integers(0, 2**32 - 1), st.sampled_from(["none", "sequence", "together"]), st.sampled_from([0.0, 1.0]))
 def test_whatever_is_resolved_keeps_its_separation_and_its_arrivals(seed: int, mode: str, window_s: float) -> None:

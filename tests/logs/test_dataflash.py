@@ -12,6 +12,7 @@ from gcsplan.logs.fit import fit_energy
 from tests.support.flight_logs import FORMATS, dataflash, dataflash_rows, degrees, flown, within
 
 
+@pytest.mark.slow
 def test_an_ardupilot_log_with_one_battery_or_two(tmp_path: Path) -> None:
     for batteries in (1, 2):
         file = dataflash(tmp_path / f"{batteries}.bin", dataflash_rows(batteries))
@@ -19,6 +20,7 @@ def test_an_ardupilot_log_with_one_battery_or_two(tmp_path: Path) -> None:
         assert within(found), found.yaml()
 
 
+@pytest.mark.slow
 def test_an_ardupilot_log_without_a_battery_or_cut_short_or_damaged(tmp_path: Path) -> None:
     rows = dataflash_rows()
     with pytest.raises(InputError, match="no battery current"):
@@ -54,6 +56,7 @@ def old_rows() -> list[tuple[str, tuple[float, ...]]]:
     return rows
 
 
+@pytest.mark.slow
 def test_a_log_of_milliseconds_and_hundredths_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for name, row in OLD.items():
         monkeypatch.setitem(FORMATS, name, row)

@@ -354,6 +354,7 @@ def test_vehicles_of_one_system_id_need_links_of_their_own() -> None:
     assert wrong(a, None) == wrong(None, a) == ["vehicles[1].sysid"]
 
 
+@pytest.mark.slow
 def test_three_hundred_vehicles_are_read() -> None:
     links = [f"udpout:127.0.0.1:{14560 + 10 * k}" for k in range(2)]
     many = [vehicle(name=f"v{k}", sysid=k // 2 + 1, link=links[k % 2]) for k in range(300)]

@@ -41,11 +41,13 @@ def said(kind: str, count: int) -> str:
         return "\n".join(str(p) for p in refusal.problems)
 
 
+@pytest.mark.slow
 def test_an_outline_of_99_000_spikes_is_refused_by_its_name(within_s: list[float]) -> None:
     within_s.append(8.0)  # minutes before
     assert "features[0].geometry.coordinates: the outline has 99000 corners" in said("corners", 99_000)
 
 
+@pytest.mark.slow
 def test_a_coast_of_30_000_corners_is_drawn_wider_with_a_note(within_s: list[float]) -> None:
     within_s.append(8.0)
     sizes.write("coast", 30_000)
@@ -144,6 +146,7 @@ def test_zones_that_all_lie_over_each_other_take_little_memory() -> None:
     assert 7 in near[bucket[square] : bucket[square + 1]]
 
 
+@pytest.mark.slow
 def test_great_circles_of_many_zones_are_counted_together(
     within_s: list[float], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -13,6 +13,7 @@ from gcsplan.native.kernel_unit import QUICK_NOTICE, compilation_reported
 from tests.support.toy_kernels import kernels, notices, ship, value
 
 
+@pytest.mark.slow
 def test_kept_code_that_is_spoilt_is_compiled_again(room: Path) -> None:
     ship(kernels(room))
     value(kernels(room))

@@ -20,6 +20,7 @@ def test_what_is_shipped_was_made_from_the_source_as_it_stands() -> None:
     assert made_of == WORLD.digest(), "run python -m gcsplan.native"
 
 
+@pytest.mark.slow
 def test_a_kernel_from_source_from_what_is_shipped_and_from_the_cache_is_the_same(room: Path) -> None:
     said: list[str] = []
     with compilation_reported(said.append):
@@ -32,6 +33,7 @@ def test_a_kernel_from_source_from_what_is_shipped_and_from_the_cache_is_the_sam
         assert len(said) == 2  # the third was found in the cache
 
 
+@pytest.mark.slow
 def test_a_change_of_the_source_is_never_answered_with_older_code(room: Path) -> None:
     ship(kernels(room))
     assert notices(room) == [QUICK_NOTICE]
@@ -40,6 +42,7 @@ def test_a_change_of_the_source_is_never_answered_with_older_code(room: Path) ->
     assert notices(room, 3.0) == []
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize(
     "spoilt",
     [pytest.param(b"", marks=pytest.mark.slow), b"{}\n", pytest.param(b"not json\nx", marks=pytest.mark.slow), None],
@@ -124,6 +127,7 @@ def fold_of(room: Path, package: str, scale: float) -> Any:
     return imported_anew(f"{package}.marked")
 
 
+@pytest.mark.slow
 def test_marked_functions_run_as_machine_code_and_are_plain_functions_still(room: Path) -> None:
     a, b, c = np.array([1.5, -2.0, 3.0]), np.array([4, 5, -6], np.int32), np.array([1, 2, 3], np.int8)
     for scale in (2.0, 0.5):  # the second time a constant in a module that the kernel's own imports has changed

@@ -73,6 +73,7 @@ def test_a_refusal_that_stems_from_unknown_ground_says_so_and_where(limits: Limi
     assert e.place_of == "that ground"
 
 
+@pytest.mark.slow
 def test_a_way_past_a_void_is_found_without_a_warning() -> None:
     """A floor and a ceiling that are both infinite have no difference."""
     found: Solution = plan(mission(without(ground(0.0), np.s_[10:, 70:74]), Limits(min_agl_m=30.0, max_climb_deg=20.0)))

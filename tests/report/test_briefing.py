@@ -51,6 +51,7 @@ def fleet_of_four(*, worst: bool) -> Page:
     return replace(told, title=title, subjects=tuple(subjects), order=order, rehearsed=rehearsed)
 
 
+@pytest.mark.slow
 def test_the_briefing_says_what_where_and_when_and_has_lines_to_sign_on() -> None:
     page = fleet_of_four(worst=False)
     text = briefing(page)
@@ -128,6 +129,7 @@ def test_the_briefing_of_four_vehicles_is_two_pages_of_a4_and_of_letter(tmp_path
         assert made.complaints() == []
 
 
+@pytest.mark.slow
 def test_the_second_page_has_way_points_parameters_and_failsafes() -> None:
     page = fleet_of_four(worst=False)
     text = briefing(page)

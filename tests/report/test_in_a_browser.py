@@ -71,7 +71,7 @@ def tip(page: Browser) -> str:
     return str(page.evaluate("document.getElementById('tip').hidden ? '' : document.getElementById('tip').innerText"))
 
 
-@pytest.mark.nightly_but("desk-light", "phone-dark")
+@pytest.mark.nightly_but("phone-dark")
 @pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
 @pytest.mark.parametrize("width", [1200, 390], ids=["desk", "phone"])
 def test_the_page_is_drawn_without_an_error_or_a_request(page: Browser, report: Path, dark: bool, width: int) -> None:

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -137,6 +138,7 @@ def test_a_mission_that_flies_nowhere_still_has_a_report() -> None:
     assert read.data["lines"] == []
 
 
+@pytest.mark.slow
 def test_obstacle_heights_silence_the_bare_dem_line_and_nothing_else_does() -> None:
     page = small_page()
     assert BARE_DEM in render_page(page)
@@ -180,6 +182,7 @@ def test_a_checked_file_is_named_by_itself_where_one_vehicle_has_several() -> No
     assert str(Note("home_row_blank")) in read.text
 
 
+@pytest.mark.slow
 def test_the_uploads_end_is_told() -> None:
     page = small_page()
     sent = {"url": "udpout:10.0.0.2:14550", "items": 7, "outcome": "accepted", "verified": True, "seconds": 1.25}

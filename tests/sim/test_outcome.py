@@ -35,6 +35,7 @@ def test_another_order_of_arrival_is_a_violation() -> None:
     assert error.exit_code == 4
 
 
+@pytest.mark.slow
 def test_two_that_meet_are_named_with_the_moment() -> None:
     parts = [a_part(1, (0, 0), (1000, 0)), a_part(2, (500, -500), (500, 500))]
     result = rehearse(parts, FLAT, Terms((), 30.0))
@@ -64,6 +65,7 @@ def test_a_battery_that_is_flown_too_low_is_a_violation() -> None:
     assert result.vehicles[0].battery_used_percent == pytest.approx(100 * (120 * 140 + 100 * 1000) / 130_000, rel=0.001)
 
 
+@pytest.mark.slow
 def test_the_document_has_its_keys_and_a_row_for_each_vehicle() -> None:
     parts = [a_part(n, (0, 200.0 * n), (500, 200.0 * n), arrive_s=reached_s(500)) for n in (1, 2)]
     result = rehearse(parts, FLAT, Terms((), 30.0), runs=9)

@@ -50,6 +50,7 @@ def test_what_is_flown_is_what_the_vehicle_stored() -> None:
     assert [i.command for i in stored.items] == [i.command for i in part.mission.items]
 
 
+@pytest.mark.slow
 def test_px4_and_planes_rehearse_too() -> None:
     copter = worlds.vehicle()
     px4 = a_part(1, (0, 0), (800, 0), vehicle=replace(copter, autopilot=Autopilot.PX4))
@@ -64,6 +65,7 @@ def test_a_mission_that_breaks_a_limit_is_not_even_sent() -> None:
         rehearse([part], FLAT, Terms())
 
 
+@pytest.mark.slow
 def test_what_is_not_understood_is_named_and_is_no_pass() -> None:
     part = a_part(1, (0, 0), (500, 0))
     unknown = MissionItem(cmd.DELAY, m.NO_POSITION, (-1.0, 12.0, 0.0, 0.0))

@@ -67,6 +67,7 @@ def test_files_with_a_home_are_judged_as_planted(folder: Path, options: WorldOpt
     assert amiss(written, check_with_options(options, Autopilot.ARDUCOPTER, list(written))) == []
 
 
+@pytest.mark.slow
 def test_files_without_a_home_are_judged_with_the_one_that_is_given(folder: Path, options: WorldOptions) -> None:
     written = corpus.write(folder, corpus.WITHOUT_HOME)
     given = WorldOptions(
@@ -404,7 +405,7 @@ def said_and_data(value: Any) -> Iterator[tuple[str, dict[str, Any]]]:
             yield from said_and_data(each)
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("form", ["--json", "--json-lines"])
 def test_each_sentence_of_json_has_its_code_and_data(run: Any, folder: Path, world: list[str], form: str) -> None:
     files = [file_of(folder, name) for name in ("round", "jump_for_ever", "low_take_off")]
@@ -427,6 +428,7 @@ def test_each_sentence_of_json_has_its_code_and_data(run: Any, folder: Path, wor
     assert low["data"]["by_m"] == low["by"]
 
 
+@pytest.mark.slow
 def test_without_a_mission_file_the_options_are_named_and_with_one_its_keys(
     run: Any, folder: Path, world: list[str]
 ) -> None:

@@ -74,6 +74,7 @@ def results(
     return list(archive.judged(workers)), archive
 
 
+@pytest.mark.slow
 def test_an_archive_is_judged_as_its_files_are_together(options: WorldOptions, files: list[str]) -> None:
     batch = check_with_options(options, None, files)
     told, archive = results(options, files, Inline())
@@ -88,7 +89,7 @@ def test_an_archive_is_judged_as_its_files_are_together(options: WorldOptions, f
     assert {t.code for t in told} == {0, 2, 4}
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("form", ["lines", "row", "whole"])
 def test_results_do_not_depend_on_who_works_nor_on_what_is_kept(
     options: WorldOptions, files: list[str], form: Form, monkeypatch: pytest.MonkeyPatch
@@ -142,6 +143,7 @@ def told_without_error(told: FileResult) -> tuple[object, ...]:
     return told.file, told.code, told.kinds, told.lines, str(told.error), told.text, told.failing
 
 
+@pytest.mark.slow
 def test_the_way_home_is_told_too(options: WorldOptions, files: list[str]) -> None:
     some = [f for f in files if "qgc-round" in f or "qgc-through" in f]
     told, archive = results(options, some, Scattered(), "row", Returns(judged=True, required=True))
@@ -153,6 +155,7 @@ def test_the_way_home_is_told_too(options: WorldOptions, files: list[str]) -> No
     assert [t.kinds.get("way_home", 0) for t in told] == [int(x) for x in unsafe]
 
 
+@pytest.mark.slow
 def test_a_bug_in_one_file_is_told_and_the_others_are_judged(
     options: WorldOptions, files: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -227,6 +230,7 @@ def world(folder: Path, options: WorldOptions) -> list[object]:
             "--max-climb", 20, "--rtl-altitude", corpus.RTL_M]  # fmt: skip
 
 
+@pytest.mark.slow
 def test_many_files_are_lines_and_a_summary(run: Any, files: list[str], world: list[object]) -> None:
     code, out, err = run(*files, *world)
     lines = out.splitlines()
@@ -246,6 +250,7 @@ def test_many_files_are_lines_and_a_summary(run: Any, files: list[str], world: l
     assert code == 4  # worse than the 2 of files that cannot be read
 
 
+@pytest.mark.slow
 def test_json_lines_are_a_row_for_each_file_and_the_summary(run: Any, files: list[str], world: list[object]) -> None:
     code, out, _ = run(*files, *world, "--json-lines")
     *rows, last = map(json.loads, out.splitlines())
@@ -268,6 +273,7 @@ def test_json_lines_are_a_row_for_each_file_and_the_summary(run: Any, files: lis
         assert not {"legs", "nearest_misses", "time_s"} & set(row)
 
 
+@pytest.mark.slow
 def test_the_document_is_written_as_one_would_be(run: Any, files: list[str], world: list[object]) -> None:
     for some in (files, files[:1], files[7:8]):
         _, out, _ = run(*some, *world, "--json")
@@ -320,6 +326,7 @@ def test_two_kinds_of_json_are_too_many(run: Any, world: list[object]) -> None:
     assert (code, "give one of them" in err) == (2, True)
 
 
+@pytest.mark.slow
 def test_the_error_of_a_document_stays_short(
     run: Any, files: list[str], world: list[object], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -36,6 +36,7 @@ def tried(limits: dict[str, Any] | None = None, **vehicle: Any) -> tuple[Plan, l
     return done, list(homes["uav1"].proposals)
 
 
+@pytest.mark.slow
 def test_an_altitude_within_the_limits_that_makes_all_safe_is_the_one_proposal() -> None:
     _, [altitude] = tried()
     assert (altitude.leaves_m, altitude.above_max_agl) == (0.0, False)
@@ -46,6 +47,7 @@ def test_an_altitude_within_the_limits_that_makes_all_safe_is_the_one_proposal()
     assert proposals == []
 
 
+@pytest.mark.slow
 def test_a_return_path_goes_before_an_altitude_above_max_agl_which_says_so() -> None:
     done, proposals = tried({"max_agl_m": 90})
     assert [p.keys[0][0] for p in proposals[:2]] == ["return_route", "rtl_rel_home_m"]

@@ -227,6 +227,7 @@ def test_a_route_is_what_the_mission_flies_in_metres() -> None:
     assert all(wire[k].command == cmd.WAYPOINT for k in route.items[1:-1])
 
 
+@pytest.mark.slow
 def test_in_the_terrain_frame_a_vehicle_is_where_the_ground_has_it() -> None:
     hill = {"peaks": [{"center": [0, 200], "height_m": 60, "decay_m": [120, 120]}]}
     limits = {"min_agl_m": 40, "max_climb_deg": 45}
@@ -299,6 +300,7 @@ def test_the_fleet_of_four_arrives_in_its_order_and_keeps_apart() -> None:
     assert math.isfinite(told["fleet"]["closest"]["time_s"])
 
 
+@pytest.mark.slow
 def test_the_file_of_a_hundred_is_a_fleet_of_a_hundred() -> None:
     source = load_mission(MISSIONS / "fleet-100.yaml")
     assert len(source.vehicles) == 100

@@ -6,12 +6,15 @@ import pickle
 from dataclasses import asdict, replace
 from inspect import signature
 
+import pytest
+
 from gcsplan.app.fleet.pipeline import plan
 from gcsplan.app.plan.model import PlanOptions
 from gcsplan.mission_file import load_mission
 from tests.support.paths import MISSIONS
 
 
+@pytest.mark.slow
 def test_a_packed_plan_holds_no_terrain_and_is_restored_as_it_was() -> None:
     [made] = plan(load_mission(MISSIONS / "jacksboro.yaml")).vehicles
     assert made.brief is not None

@@ -40,6 +40,7 @@ def planned(**vehicle: Any) -> Plan:
     return plan(load_mission(Path("wall.yaml"), text=yaml.safe_dump(asked)))
 
 
+@pytest.mark.slow
 def test_where_no_altitude_helps_a_path_back_is_proposed() -> None:
     home = homes_of(planned())["uav1"]
     assert home.safe is False
@@ -94,6 +95,7 @@ def test_where_no_path_back_is_written_one_message_says_why(vehicle: dict[str, A
         planned(return_route="mission", **vehicle)
 
 
+@pytest.mark.slow
 def test_a_path_back_keeps_the_descent_limit_where_the_way_out_climbs() -> None:
     asked = WALL | {
         "terrain": {"flat_m": 0, "peaks": [{"center": [1000, 0], "height_m": 300, "decay_m": [300, 900]}]},

@@ -236,6 +236,7 @@ def test_a_take_off_may_go_on_in_circles_which_are_flown_and_judged() -> None:
     assert {(f.seq, f.kind) for f in circling_up(inside).findings} >= {(2, "zone")}
 
 
+@pytest.mark.slow
 def test_out_of_a_bowl_it_climbs_in_circles() -> None:
     def bowl(east: Floats, north: Floats) -> Floats:
         return GROUND_M + 240.0 * np.exp(-(((np.hypot(east, north) - 900.0) / 230.0) ** 2))
@@ -436,6 +437,7 @@ def test_two_vias_with_right_angles_are_passed_over_flat_ground() -> None:
     assert_past_vias(over_flat(*places), places[:-1])
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("most_deg", [12.0, 35.0, 115.0])
 @pytest.mark.parametrize("count", [2, *(pytest.param(k, marks=pytest.mark.slow) for k in (3, 4))])
 def test_any_vias_far_apart_are_passed_over_flat_ground(count: int, most_deg: float) -> None:
@@ -454,6 +456,7 @@ def test_a_survey_in_rows_of_a_few_radii_is_flown(apart: float) -> None:
     assert_past_vias(over_flat(*rows, (-400.0, 3.5 * apart * 80.0)), rows)
 
 
+@pytest.mark.slow
 def test_a_via_nearer_than_the_climb_out_is_long_is_reached_by_a_detour() -> None:
     places = [(600.0, 0.0), (2000.0, 300.0), (3500.0, 0.0)]
     assert_past_vias(over_flat(*places), places[:-1])
@@ -492,6 +495,7 @@ def test_the_example_plans_to_a_safe_mission_near_its_bound(circling: Plan) -> N
     assert "flown_as_quadplane" not in codes(v.notes)
 
 
+@pytest.mark.slow
 def test_the_files_it_exports_pass_the_check(circling: Plan, tmp_path: FilePath) -> None:
     files = []
     for name, content in outputs_of(circling).items():
@@ -603,6 +607,7 @@ def test_a_climb_out_that_obstacles_close_says_so_and_what_to_do() -> None:
         plan(load_mission(MISSIONS / "m.yaml", text=forested))
 
 
+@pytest.mark.slow
 def test_the_bound_of_a_wing_holds_from_the_end_of_its_climb_out(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -626,6 +631,7 @@ def test_the_bound_of_a_wing_holds_from_the_end_of_its_climb_out(
     assert Note("planned_again", times=2) in v.solution.notes
 
 
+@pytest.mark.slow
 def test_that_margins_shut_the_way_between_a_wings_ends_is_no_proof(monkeypatch: pytest.MonkeyPatch) -> None:
     """With margins the search is refused as proved: the answer is that of the limits of the check."""
     (v,) = plan(load_mission(MISSIONS / "m.yaml", text=text_of())).vehicles

@@ -102,6 +102,7 @@ def test_a_wing_levels_off_late_under_its_fence() -> None:
     assert "FENCE_ALT_MAX is 90" in sent(done, board("arduplane", **fenced, FENCE_ALT_MAX=90)).message
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize(
     ("mute", "parameters", "autopilot", "refused"),
     [
@@ -204,6 +205,7 @@ def test_a_fence_that_enables_itself_is_told() -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_rehearsal_tells_what_it_does_not_fly() -> None:
     done = planned(keys(end="rtl", rtl_rel_home_m=60))
     values = {"FENCE_ENABLE": 1.0, "FENCE_TYPE": 2.0, "FENCE_RADIUS": 300.0, "FS_THR_ENABLE": 3.0, "RTL_ALT_TYPE": 1.0}

@@ -42,6 +42,7 @@ def test_lines_and_rows_have_every_mission_and_leave_empty_what_is_unknown() -> 
     assert "gap - % over oracle - %" in line(made()[1])
 
 
+@pytest.mark.slow
 def test_a_mission_with_nothing_in_the_way_is_as_long_as_the_graph_says(tmp_path: Path) -> None:
     told: list[str] = []
     (found,) = run(tmp_path, count=1, kinds=["leg"], tell=told.append)

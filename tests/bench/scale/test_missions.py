@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 import yaml
 
 from gcsplan.bench.scale.missions import EQUATOR_DEGREE_M, make_missions, make_mosaic, mission
@@ -26,6 +27,7 @@ def test_missions_are_those_of_their_seed_and_5_to_40_km_long(tmp_path: Path) ->
     assert {c["terrain"]["dem"] for c in contents} == {"sample:jacksboro", str(tmp_path / "tiles")}
 
 
+@pytest.mark.slow
 def test_the_made_hills_are_the_same_however_fine_they_are(tmp_path: Path) -> None:
     heights = []
     for posts in (30, 90):

@@ -214,6 +214,7 @@ def test_a_leg_shorter_than_its_arcs_climbs_over_what_is_flown(limit_deg: float,
     assert kinds == (set() if safe else {"climb"}), found.describe()
 
 
+@pytest.mark.slow
 def test_a_copters_blended_corners_lie_within_the_widened_legs() -> None:
     """Second implementation: while it turns, the copter is moved by what both legs add, half of the shorter at most."""
     craft = vehicle(COPTER, horizontal_clearance_m=0.0, track_error_m=0.0, altitude_error_m=0.0)

@@ -111,6 +111,7 @@ def test_a_leg_follows_what_the_autopilot_interpolates(at: tuple[float, float]) 
             assert abs(height - (read + 80.0 + 30.0 * one)) < allowed + 0.06
 
 
+@pytest.mark.slow
 def test_a_leg_that_ends_on_a_line_of_posts_has_no_steep_end() -> None:
     """A border that is crossed a hair before the end made a piece of 1e-12 m, whose slope was noise: 20.8°."""
     where = fine_world(lambda e, n: 300.0 + 0.01 * e)

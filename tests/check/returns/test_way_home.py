@@ -126,6 +126,7 @@ def test_at_the_lowest_altitude_it_is_safe_and_a_little_below_it_is_not(autopilo
     assert judged(w, m, v, lowest - 1.2).safe is False
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("autopilot", [Autopilot.ARDUCOPTER, Autopilot.ARDUPLANE])
 def test_lines_home_that_are_judged_a_few_at_once_give_the_same(
     autopilot: Autopilot, monkeypatch: pytest.MonkeyPatch
@@ -238,6 +239,7 @@ def test_a_wall_without_a_top_leaves_no_altitude_and_rally_points_mend_it() -> N
     assert judged(w, m, v, 60.0, rally=False).rally == ()
 
 
+@pytest.mark.slow
 def test_rally_points_are_chosen_by_few_parts_of_a_mission_of_many_stretches(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each stretch was looked at from each candidate: most of the time that a long mission took."""
     w = world(300.0, [Zone("tower", Circle(1500.0, 0.0, 150.0))])
@@ -552,7 +554,7 @@ def test_figures_are_plain_values_and_words() -> None:
 # -- brute force ----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("autopilot", "seeds"), [(COPTER, (5002, 5119, 6077, 4000, 4002)), (PX4, (4003, 4007, 4011)), (PLANE, (4000, 4001))]
 )

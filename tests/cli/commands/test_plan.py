@@ -49,6 +49,7 @@ def test_an_unknown_planner_names_the_nearest(run: Any, planner: str) -> None:
     assert planner == "optimal" or "optimal" in err
 
 
+@pytest.mark.slow
 def test_a_vehicle_that_stands_elsewhere_is_refused_unless_that_is_ignored(run: Any) -> None:
     with SimServer([vehicle(amsl_m=900.0)], "udpin:127.0.0.1:0", speedup=10.0) as server:
         assert run("plan", CROSSING, "--upload", server.url_for_gcs)[0] == 5
@@ -75,6 +76,7 @@ def test_planners_are_listed(run: Any) -> None:
     assert json.loads(run("planners", "--json")[1])["planners"][0]["name"] == "optimal"
 
 
+@pytest.mark.slow
 def test_a_plan_says_which_outputs_of_the_earlier_one_are_gone(run: Any, tmp_path: Path) -> None:
     out = tmp_path / "out"
     assert run("plan", str(CROSSING), "-o", str(out), "--report")[0] == 0
@@ -86,6 +88,7 @@ def test_a_plan_says_which_outputs_of_the_earlier_one_are_gone(run: Any, tmp_pat
     assert "gone from" not in run("plan", str(CROSSING), "-o", str(out))[2]
 
 
+@pytest.mark.slow
 def test_a_plan_says_what_changed_since_the_last_one_and_since_the_mission_on_board(run: Any) -> None:
     with SimServer([vehicle()], "udpin:127.0.0.1:0", speedup=10.0) as server:
         assert "since" not in run("plan", CROSSING, "--upload", server.url_for_gcs)[1]
@@ -106,6 +109,7 @@ def test_a_wrong_mission_to_compare_with_is_refused_before_planning(run: Any, tm
     assert not (tmp_path / "crossing").exists()
 
 
+@pytest.mark.slow
 def test_the_best_way_home_is_applied_and_saved(run: Any, tmp_path: Path) -> None:
     file = tmp_path / "field.yaml"
     zone = {"name": "tower", "center": [47.0, 8.01], "radius_m": 60, "ceiling_agl_m": 45}

@@ -21,6 +21,7 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_the_command_prints_one_document_and_its_code(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(typer.Exit) as ended:
         command(file, as_json=True)
@@ -32,6 +33,7 @@ def test_the_command_prints_one_document_and_its_code(file: Path, capsys: pytest
     assert "error" not in document
 
 
+@pytest.mark.slow
 def test_a_violation_ends_the_command_with_four_and_is_said_in_both_ways(
     file: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

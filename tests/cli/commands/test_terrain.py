@@ -41,6 +41,7 @@ def vehicle() -> Iterator[str]:
         yield server.url_for_gcs
 
 
+@pytest.mark.slow
 def test_files_for_the_card_read_as_terrain(run: Run, mission: Path, tmp_path: Path) -> None:
     out = tmp_path / "terrain"
     code, text, _ = run("terrain", "dat", mission, "-o", out, "--margin-km", 1, "--json")
@@ -75,6 +76,7 @@ def test_a_margin_that_is_too_wide_is_refused(run: Run, mission: Path, tmp_path:
     assert not (tmp_path / "x").exists()
 
 
+@pytest.mark.slow
 def test_serve_until_loaded_and_check(run: Run, mission: Path, vehicle: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(link_terrain, "ASK_AFTER_S", 0.0)
     monkeypatch.setattr("gcsplan.app.upload.terrain_service.QUIET_S", 0.3)

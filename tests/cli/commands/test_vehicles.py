@@ -60,6 +60,7 @@ def send(run: Any, url: str, change: Change, rows: slice = slice(2, None)) -> in
     return changed
 
 
+@pytest.mark.slow
 def test_what_mavproxy_cuts_is_named_judged_and_taken(run: Any, url: str) -> None:
     number = send(run, url, cut)
     assert number > 0
@@ -123,6 +124,7 @@ def test_a_mission_of_another_place_is_a_difference_and_no_crash(run: Any, url: 
     assert "Traceback" not in said
 
 
+@pytest.mark.slow
 def test_with_a_mission_file_what_is_on_board_is_judged_in_its_world(run: Any, url: str, tmp_path: Path) -> None:
     stricter = tmp_path / "stricter.yaml"
     stricter.write_text(CROSSING.read_text().replace("min_agl_m: 60", "min_agl_m: 70"))
@@ -166,6 +168,7 @@ def test_an_empty_board_was_sent_nothing(run: Any, url: str) -> None:
     assert "sent" not in text
 
 
+@pytest.mark.slow
 def test_files_are_uploaded_verified_downloaded_and_cleared(run: Any, tmp_path: Path) -> None:
     assert run("plan", CROSSING, "-o", "out")[0] == 0
     with SimServer([vehicle()], "udpin:127.0.0.1:0", speedup=10.0) as server:
@@ -182,6 +185,7 @@ def test_files_are_uploaded_verified_downloaded_and_cleared(run: Any, tmp_path: 
         assert server.vehicles[0].items()[1:] == ()
 
 
+@pytest.mark.slow
 def test_an_unsafe_file_is_not_sent_unless_unchecked(run: Any, tmp_path: Path) -> None:
     assert run("plan", CROSSING, "-o", "out")[0] == 0
     higher = changed(tmp_path, "min_agl_m: 60", "min_agl_m: 70")

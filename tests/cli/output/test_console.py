@@ -36,6 +36,7 @@ def shown(monkeypatch: pytest.MonkeyPatch) -> tuple[io.StringIO, io.StringIO]:
     return out, err
 
 
+@pytest.mark.slow
 def test_each_vehicle_of_a_large_fleet_has_one_line(shown: tuple[io.StringIO, io.StringIO]) -> None:
     out, _ = shown
     console.plan_table(plan(fleet(31)), {})

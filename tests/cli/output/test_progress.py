@@ -97,6 +97,7 @@ def test_no_color_is_respected(monkeypatch: pytest.MonkeyPatch) -> None:
     assert re.search(r"\x1b\[[\d;]*m", shown.getvalue()) is None
 
 
+@pytest.mark.slow
 def test_elsewhere_there_is_a_line_now_and_then(monkeypatch: pytest.MonkeyPatch) -> None:
     assert display.LINE_S == 5.0
     monkeypatch.setattr(display, "LINE_S", 0.2)

@@ -78,6 +78,7 @@ print(threading.active_count())
     assert ended.stdout.splitlines()[-1] == "2"
 
 
+@pytest.mark.slow
 def test_what_python_can_undo_is_undone_also_after_code_that_stops_all_threads() -> None:
     """Between the two calls of the list Python has no turn; the second keeps the listener from looking."""
     busy = """

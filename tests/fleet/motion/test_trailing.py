@@ -36,6 +36,7 @@ def hills(height_m: float, wave_m: float) -> Callable[[float], float]:
     return lambda x: height_m * math.sin(2.0 * math.pi * x / wave_m)
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("speed_m_s", [5.0, 9.0, 15.0])
 @pytest.mark.parametrize(("height_m", "wave_m"), [(30.0, 700.0), (20.0, 300.0), (60.0, 1500.0)])
 def test_hills_are_flown_in_the_time_of_the_autopilots_own_rule(

@@ -363,6 +363,7 @@ def run(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], tmp_
     return call
 
 
+@pytest.mark.slow
 def test_plan_and_upload_send_the_fence_where_that_is_asked_for(run: Any) -> None:
     code, _, err = run("plan", "m.yaml", "-o", "out", "--upload", "sim", "--fence")
     assert code == 0, err

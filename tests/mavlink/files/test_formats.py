@@ -399,6 +399,7 @@ def test_where_a_landing_sequence_begins_may_stand_in_degrees_in_frame_2(command
     assert (read.command, read.x, read.y) == (command, 47, 8)
 
 
+@pytest.mark.slow
 def test_a_mission_of_more_than_ten_thousand_items_is_not_read() -> None:
     rows = "".join(f"{i}\t0\t3\t16\t0\t0\t0\t0\t1\t1\t1\t1\n" for i in range(1, 10_005))
     with pytest.raises(InputError, match="more than 10000 items"):

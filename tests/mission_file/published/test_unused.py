@@ -95,6 +95,7 @@ def test_longitudes_of_either_convention_are_read(tmp_path: Path, form: str, tur
     assert verdict(tmp_path, form, lon, 46.05, ring) == "inside"
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("form", FORMATS)
 @pytest.mark.parametrize("lon", [179.96, -179.96])
 def test_across_the_antimeridian(tmp_path: Path, form: str, lon: float) -> None:

@@ -40,6 +40,7 @@ def test_a_line_is_pulled_on_the_side_of_a_zone_that_its_path_passes_it_on() -> 
         assert room == pytest.approx((100.0, 400.0) if side else (10.0, 40.0))
 
 
+@pytest.mark.slow
 def test_a_path_that_climbs_aslant_is_better_than_one_with_laps() -> None:
     p = under_a_lid()
     below = looked(p).incumbent

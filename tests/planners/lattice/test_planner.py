@@ -215,6 +215,7 @@ def test_laps_too_wide_for_the_pit_are_not_flown() -> None:
     assert extend(p, stops, np.ones(2, bool), np.full(2, np.nan)) is None
 
 
+@pytest.mark.slow
 def test_out_of_a_pit_under_max_agl_the_way_winds_up() -> None:
     p = pit_problem(limits=replace(STEEP, max_agl_m=60.0))
     path = plan(p)

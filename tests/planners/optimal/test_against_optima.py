@@ -28,6 +28,7 @@ from tests.oracles.optima_campaign import TOUCH_M, exact_past_discs, judge, reve
 from tests.oracles.optima_polish import PATIENT, Effort, cost_of, is_feasible
 from tests.oracles.optima_search import best_path
 from tests.oracles.optima_worlds import FAMILIES, HOLED, hills, make, pass_height, plane_ground
+from tests.support.effort import seeds
 
 pytestmark = pytest.mark.slow
 
@@ -135,7 +136,7 @@ def test_patient_search_comes_within_a_hair_of_known_optima() -> None:
 # --- the planner --------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.nightly_but("bands", "clearances")
+@pytest.mark.nightly_but("bands")
 @pytest.mark.parametrize("family", FAMILIES)
 def test_bound_is_never_over_and_path_never_under_what_is_known(family: str) -> None:
     verdicts = [judge(family, seed, BRIEF) for seed in range(WORLDS[family])]
@@ -214,7 +215,7 @@ def tunnel(seed: int, climb_deg: float, band: bool) -> tuple[Problem, Floats]:
 
 
 @pytest.mark.parametrize("band", [False, True])
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", seeds(4, 4, 8))
 def test_profile_in_a_tunnel_is_the_linear_programmes(seed: int, band: bool) -> None:
     climb_deg = (90.0, 25.0, 12.0, 6.0)[seed % 4]
     problem, track = tunnel(seed, climb_deg, band)

@@ -21,6 +21,7 @@ from gcsplan.world.geometry.limits import Limits
 from gcsplan.world.geometry.path import Path
 from gcsplan.world.geometry.surface import Surface
 from gcsplan.world.geometry.zones import Circle, Level, Polygon, Zone
+from tests.support.effort import seeds
 from tests.support.paths import MISSIONS
 from tests.support.planner_worlds import FIELD, Floats, faults, ground, random_mission
 
@@ -163,6 +164,7 @@ def test_band_over_the_ground_is_followed_up_and_down_a_hill() -> None:
     assert gentle.path.length_m > s.path.length_m
 
 
+@pytest.mark.slow
 def test_a_maximum_agl_over_level_ground_is_a_maximum_amsl() -> None:
     """Same bytes, and the searches of the plane apply: only a band over uneven ground is searched on a lattice."""
     level = ground(200.0)
@@ -305,7 +307,7 @@ def test_ssgwo_table_3_is_solved_within_one_percent(unlimited: bool, optimum_m: 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", seeds(2, 2, 5))
 def test_random_missions_on_the_sample_are_solved_safely(seed: int) -> None:
     assert faults_of_plan(random_mission(seed)) == []
 
@@ -383,8 +385,8 @@ MAST = Zone("mast", Circle(45.0, 38.0, 9.0), None, Level(60.0, "amsl"))
 ROOF = Zone("roof", Circle(75.0, 60.0, 20.0), Level(50.0, "agl"), None)
 
 
+@pytest.mark.slow
 @pytest.mark.nightly_but("zones1-via1-90.0-length", "zones3-via3-90.0-energy")
-@pytest.mark.first_quick
 @pytest.mark.parametrize(
     ("zones", "via", "degrees", "objective"),
     [

@@ -319,6 +319,7 @@ def attempt(problem: Problem) -> Solution | Refusal:
         return refusal
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("first", [0, *(pytest.param(k, marks=pytest.mark.nightly) for k in (50, 100, 150))])
 def test_bounds_and_proofs_hold_for_the_world_beyond_the_window(first: int) -> None:
     wider = 0
@@ -384,7 +385,7 @@ def test_the_lines_of_a_border_in_degrees_lie_within_the_nodes() -> None:
 # -- the campaign ------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize(("family", "seed"), [("ridge", 4), ("tiles", 3), ("edge", 1)])
 def test_campaign_of_worlds(family: str, seed: int) -> None:
     outcome = worlds.judge(family, seed, budget_s=600.0)
@@ -393,7 +394,7 @@ def test_campaign_of_worlds(family: str, seed: int) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.nightly_but("101-ridge", "100-tiles", "101-edge")
+@pytest.mark.nightly_but("100-tiles", "101-edge")
 @pytest.mark.parametrize("family", ["ridge", "tiles", "edge"])
 @pytest.mark.parametrize("seed", range(100, 106))
 def test_campaign_of_worlds_longer(family: str, seed: int) -> None:

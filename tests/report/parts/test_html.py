@@ -117,6 +117,7 @@ def test_no_label_lies_on_a_label_a_symbol_or_the_rim() -> None:
     assert placed > 20 * 20  # half of a crowd at least
 
 
+@pytest.mark.slow
 def test_the_better_label_stays_and_one_that_is_alone_stands_above_its_symbol() -> None:
     one = {"x": 300, "y": 200, "r": 4, "w": 60, "h": 15, "inside": False}
     ring = {"x": 301, "y": 201, "r": 9, "w": 0, "h": 0, "inside": False}

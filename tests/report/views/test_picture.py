@@ -29,6 +29,7 @@ def test_each_figure_is_drawn_as_a_png_too() -> None:
         assert image.width > 800
 
 
+@pytest.mark.slow
 def test_no_label_of_the_map_lies_on_another() -> None:
     page = page_of_plan(planned())
     figure = draw(page)
@@ -47,6 +48,7 @@ def test_the_map_has_the_reports_colours_low_ground_is_no_lake() -> None:
     assert float(np.mean((blue > green + 20) & (blue > red + 20))) < 0.001
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize(("form", "begins"), [("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF")])
 def test_a_picture_of_each_form_has_the_same_bytes_again(form: str, begins: bytes) -> None:
     small = plan(FLAT)

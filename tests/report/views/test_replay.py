@@ -97,6 +97,7 @@ def test_heights_above_ground_are_those_of_the_surface_and_the_arrival_is_kept()
             assert needed in t
 
 
+@pytest.mark.slow
 def test_a_checked_file_has_no_replay_and_one_vehicle_has_one() -> None:
     read = Reader(render_page(small_page()))
     assert read.data["replay"] is None
@@ -179,6 +180,7 @@ def test_times_heights_and_distances_are_told_as_everywhere_on_the_page() -> Non
     ]  # fmt: skip
 
 
+@pytest.mark.slow
 @in_node
 def test_a_place_that_is_passed_twice_is_found_by_its_time() -> None:
     there = list(range(0, 1001, 10))

@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from html.parser import HTMLParser
 
+import pytest
+
 from gcsplan.app.fleet.pipeline import plan
 from gcsplan.report.views.sketch import JUDGED, sketch_html
 from tests.export.test_output_schema import FLAT
@@ -34,6 +36,7 @@ def test_the_sketch_has_map_and_table_and_nothing_that_a_policy_blocks() -> None
     assert JUDGED[True] in html
 
 
+@pytest.mark.slow
 def test_a_fleet_of_many_has_as_many_rows_as_vehicles() -> None:
     assert len(re.findall("<tr><th>uav", plan("sample:fleet-4")._repr_html_())) == 4
     assert callable(sketch_html)

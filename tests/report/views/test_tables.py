@@ -82,6 +82,7 @@ def table(read: Reader) -> list[str]:
     return read.text.split("Flown beside planned")[1].split("In space")[0].split()
 
 
+@pytest.mark.slow
 def test_flown_figures_come_from_the_tracks_and_stand_beside_the_plans(
     folder: Path,
 ) -> None:
@@ -111,6 +112,7 @@ def test_flown_figures_come_from_the_tracks_and_stand_beside_the_plans(
     assert "fleet least separation" in words
 
 
+@pytest.mark.slow
 def test_the_replay_holds_the_plan_and_the_flight_each_from_its_own_source(folder: Path) -> None:
     made, result = planned(folder), flown(folder)
     tracks = Reader(render_rehearsal(made, result)).data["replay"]["tracks"]
@@ -135,6 +137,7 @@ def test_the_first_of_several_runs_is_shown_and_said(folder: Path) -> None:
     assert "replay show the first run" in read.text
 
 
+@pytest.mark.slow
 def test_a_rehearsal_that_went_wrong_is_the_headline(folder: Path) -> None:
     made, result = planned(folder), flown(folder)
     terms = replace(result.terms, order=())

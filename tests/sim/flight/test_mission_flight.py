@@ -38,6 +38,7 @@ def test_a_lower_speed_on_the_move_takes_hold_as_slowly_as_on_a_real_arducopter(
     assert speed_at(flown, 50 + 300 + leg_m) == pytest.approx(measured_m_s, rel=0.1)
 
 
+@pytest.mark.slow
 def test_a_speed_commanded_at_a_standstill_holds_from_the_start() -> None:
     way = track(
         TAKEOFF, speed(10), at(cmd.WAYPOINT, 0, 300, 50, p1=4), speed(3), at(cmd.WAYPOINT, 0, 400, 50),
@@ -50,6 +51,7 @@ def test_a_speed_commanded_at_a_standstill_holds_from_the_start() -> None:
     assert max(speed_at(flown, 50 + x) for x in np.arange(310, 890, 20)) == pytest.approx(3.0, abs=0.01)
 
 
+@pytest.mark.slow
 def test_a_straight_flight_takes_the_time_of_its_trapezoids() -> None:
     way = track(TAKEOFF, at(cmd.WAYPOINT, 0, 800, 50), at(cmd.LAND, 0, 800, 0))
     flown = fly([way], [7.0])
@@ -92,6 +94,7 @@ def test_a_short_leg_is_flown_as_slowly_as_a_real_arducopter_flew_it(leg_m: floa
     assert speed_at(flown, 50 + 400) == pytest.approx(15.0, rel=0.01)
 
 
+@pytest.mark.slow
 def test_waits_in_the_air_and_on_the_ground_last_as_long_as_they_say() -> None:
     plain = fly([track(TAKEOFF, at(cmd.WAYPOINT, 0, 200, 50), at(cmd.WAYPOINT, 0, 400, 50))], [0.0])
     waits = track(delay(12), TAKEOFF, delay(7.5), at(cmd.WAYPOINT, 0, 200, 50), at(cmd.WAYPOINT, 0, 400, 50))
@@ -104,6 +107,7 @@ def test_waits_in_the_air_and_on_the_ground_last_as_long_as_they_say() -> None:
     assert fly([held], [0.0]).hold_s[0] == 30.0
 
 
+@pytest.mark.slow
 def test_a_return_climbs_flies_straight_home_and_comes_down_there() -> None:
     way = track(TAKEOFF, at(cmd.WAYPOINT, 300, 400, 50), MissionItem(cmd.RTL, m.NO_POSITION), rtl_rel_home_m=80)
     flown = fly([way], [0.0])
@@ -132,6 +136,7 @@ def test_the_ideal_vehicle_of_the_papers_flies_length_over_speed() -> None:
     assert fly([way], [0.0]).arrive_s[0] == pytest.approx(length_m / 8, abs=0.1)
 
 
+@pytest.mark.slow
 @settings(max_examples=8)
 @given(
     legs=st.lists(st.tuples(st.floats(-150, 150), st.floats(-150, 150), st.floats(20, 90)), min_size=1, max_size=6),
@@ -173,6 +178,7 @@ def test_a_quarter_of_the_step_flies_the_same(monkeypatch: pytest.MonkeyPatch) -
     assert coarse.end_s[0] == pytest.approx(fine.end_s[0], abs=0.05)
 
 
+@pytest.mark.slow
 def test_planes_and_px4_are_flown_too() -> None:
     for autopilot, takeoff in ((Autopilot.PX4, cmd.TAKEOFF), (Autopilot.ARDUPLANE, cmd.VTOL_TAKEOFF)):
         vehicle = replace(COPTER, autopilot=autopilot)

@@ -55,6 +55,7 @@ def test_a_speed_counts_in_the_metres_of_the_autopilot(lat_deg: float, autopilot
         assert flown.command_m_s[-1] == pytest.approx(8.0 * ratio, rel=2e-5)
 
 
+@pytest.mark.slow
 def test_neither_a_change_of_pitch_nor_a_way_point_on_a_line_costs_time() -> None:
     straight = fly([track(TAKEOFF, at(cmd.WAYPOINT, 0, 800, 50))], [0.0])
     cut = fly([track(TAKEOFF, at(cmd.WAYPOINT, 0, 300, 50), at(cmd.WAYPOINT, 0, 800, 50))], [0.0])

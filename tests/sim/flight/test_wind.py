@@ -27,6 +27,7 @@ def test_wind_within_the_airspeed_costs_no_time_and_beyond_it_costs_what_is_miss
     assert across == pytest.approx(CLIMB_S + 1000 / v + v / 1.5, abs=0.1)
 
 
+@pytest.mark.slow
 def test_wind_adds_to_what_keeps_its_airspeed() -> None:
     """A real ArduPlane in 5 m/s (SITL) took 632.1 s over 15 legs of the jacksboro wing where this took 631.3."""
     ideal = replace(COPTER, accel_m_s2=math.inf, corner_accel_m_s2=math.inf)

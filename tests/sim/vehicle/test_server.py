@@ -107,6 +107,7 @@ def test_a_vehicle_that_speaks_first() -> None:
             assert server.url_for_gcs == url.replace("udpout", "udpin")
 
 
+@pytest.mark.slow
 def test_pymavlink_takes_it_for_a_vehicle_over_udp_and_tcp() -> None:
     for url in ("udpin:127.0.0.1:0", "tcpin:127.0.0.1:0"):
         with SimServer([a_vehicle(9)], url) as server:
@@ -141,6 +142,7 @@ def test_a_tcp_client_that_hangs_up_is_forgotten() -> None:
             assert "AUTOPILOT_VERSION" in seen
 
 
+@pytest.mark.slow
 def test_a_server_in_a_process_of_its_own() -> None:
     with SimServer([a_vehicle(3)], "udpin:127.0.0.1:0", process=True) as server, station(server.address) as one:
         assert one.upload(some_items(20), sysid=3) == 0
@@ -157,6 +159,7 @@ def test_a_fast_clock_asks_again_early() -> None:
             SimServer([a_vehicle()], "udpin:127.0.0.1:0", speedup=speedup)
 
 
+@pytest.mark.slow
 def test_a_port_in_use_is_said() -> None:
     with SimServer([a_vehicle()], "udpin:127.0.0.1:0") as server:
         busy = f"udpin:127.0.0.1:{server.address[1]}"

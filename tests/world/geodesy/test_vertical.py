@@ -49,6 +49,7 @@ def is_times(surface: Surface, heights: Any, metres: float) -> bool:
     )
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("code", UPWARDS)
 def test_a_vertical_code_has_its_unit_wherever_it_stands(tmp_path: Path, code: int) -> None:
     metres, name = UPWARDS[code]
@@ -78,6 +79,7 @@ def test_what_counts_down_or_from_another_zero_is_refused_by_name(tmp_path: Path
         assert ("downwards" if code in DEPTHS else "mean sea level") in str(error)
 
 
+@pytest.mark.slow
 def test_a_datum_is_known_by_its_exact_name_too() -> None:
     datum, unit = stated_datum("NAVD88 height (ftUS)", where="m")
     assert (datum.name, unit is not None and unit.metres) == ("NAVD88", pytest.approx(US_FOOT))
@@ -128,6 +130,7 @@ NAVD88_SHIFTED = (
 )
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize(
     ("vertical", "words"),
     [

@@ -20,6 +20,7 @@ def ring_of(kind: str, count: int, seed: int) -> Floats:
     return np.array((smooth if kind == "smooth" else spiky)(count, random.Random(seed)))
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("kind", ["smooth", "spiky"])
 @pytest.mark.parametrize("tolerance_m", [0.5, 20.0])
 @pytest.mark.parametrize("outward", [True, False])
@@ -41,6 +42,7 @@ def test_an_outline_with_fewer_corners_is_never_on_the_wrong_side(kind: str, tol
         assert shapely.distance(to, shapely.points(places)).max() <= tolerance_m + 1e-6
 
 
+@pytest.mark.slow
 def test_a_long_smooth_outline_becomes_short() -> None:
     found = fewer_corners(ring_of("smooth", 90_000, 1), 0.5)
     assert found is not None
@@ -57,6 +59,7 @@ def test_a_bay_whose_mouth_would_be_closed_gives_no_outline_that_crosses_itself(
         )
 
 
+@pytest.mark.slow
 def test_crossings_are_counted_twice_and_only_so_far() -> None:
     bow_tie = np.array([[0, 0], [10, 10], [10, 0], [0, 10]], float)
     assert crossings(bow_tie) == 2
@@ -64,6 +67,7 @@ def test_crossings_are_counted_twice_and_only_so_far() -> None:
     assert crossings(np.random.default_rng(1).uniform(0.0, 1.0, (90_000, 2))) > MOST_CROSSINGS
 
 
+@pytest.mark.slow
 def test_an_outline_that_would_take_minutes_is_refused_at_once() -> None:
     begun = time.process_time()
     ring, why = outline_of([(n / 1e5, e / 1e5) for e, n in ring_of("spiky", 99_000, 1).tolist()])

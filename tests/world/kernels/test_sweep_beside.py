@@ -79,6 +79,7 @@ def test_the_nearest_unknown_patch_is_found_and_none_is_infinitely_far() -> None
         assert unknown_near(FIELD.packed, z, gaps, *args[:-1], 11.0)[0] == 11.0
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize(
     "seed",
     [

@@ -29,6 +29,7 @@ def layer(cell: float, z: np.ndarray, **at: float) -> TerrainLayer:
     return TerrainLayer(window, cell_m(window), f"{cell:g} m")
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("name", NAMES[0:1] + NAMES[3:4] + NAMES[5:6] + NAMES[7:8] + NAMES[9:])
 def test_no_ground_lies_outside_the_two_heights_of_layers(name: str, tmp_path: Path) -> None:
     wider = 2.0 if name == "equally fine" else 6.0  # and still finer than the file beside them
@@ -45,6 +46,7 @@ def test_no_ground_lies_outside_the_two_heights_at_twenty_thousand_places(name: 
     assert run(layout, tmp_path, 20_000, 11).wrong == 0
 
 
+@pytest.mark.slow
 def test_the_oracle_sees_a_seam_that_is_judged_by_one_height(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The finest heights alone, as a merge would keep them, lie below the ground beside a seam."""
     layout = next(one for one in layouts(7, 4.0) if one.name == "a cliff of forty metres")

@@ -177,6 +177,7 @@ def test_a_geotiff_in_degrees_is_bilinear_between_its_cell_centres(tmp_path: Pat
     assert surface.grid.error_m < 0.01
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("crs", ["EPSG:32616", "EPSG:3857", "EPSG:5070", "EPSG:4269", "EPSG:32617", "EPSG:26916+5703"])
 def test_a_geotiff_in_any_system_is_bilinear_in_its_own_grid(tmp_path: Path, crs: str) -> None:
     there = Transformer.from_crs(FRAME.crs, crs.split("+")[0], always_xy=True, allow_ballpark=False)
@@ -618,6 +619,7 @@ def test_a_geoid_grid_of_impossible_steps_is_refused(tmp_path: Path, step: float
         GeoidGrid(Path(path), where="m")
 
 
+@pytest.mark.slow
 def test_a_geoid_grid_with_strips_of_no_rows_is_no_danger(tmp_path: Path) -> None:
     """PROJ divides by the number of rows per strip, which would end the process."""
     path = Path(geoid_tif(tmp_path / "g.tif", np.full((60, 60), -30.0), -85.0, 37.0, 0.02, compress="deflate"))
@@ -1051,6 +1053,7 @@ def test_a_mission_too_wide_for_the_polynomial_is_refused(tmp_path: Path) -> Non
     assert math.isfinite(load(path, frame=frame, box=(-20e3, -20e3, 20e3, 20e3)).ground_at(0.0, 0.0))
 
 
+@pytest.mark.slow
 def test_a_unit_that_proj_does_not_know_is_no_line_of_a_library(tmp_path: Path) -> None:
     good, odd = tmp_path / "good.tif", tmp_path / "odd.tif"
     profile = {"driver": "GTiff", "height": 3, "width": 3, "count": 1, "dtype": "float32", "crs": "EPSG:4326"}

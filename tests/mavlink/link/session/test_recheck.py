@@ -114,6 +114,7 @@ def test_a_vehicle_that_comes_back_changed_gets_no_second_attempt(
     assert board.count(Count) == 1
 
 
+@pytest.mark.slow
 def test_what_is_allowed_holds_for_every_look() -> None:
     assert uploaded(comes_back(arm), allow_armed=True).error() is None
     assert uploaded(comes_back(carry_off), ignore_position=True).error() is None

@@ -157,6 +157,7 @@ def test_the_read_back_is_checked_again() -> None:
     assert (told["failed_check"], told["failed_check_data"]) == (str(silent), silent.as_dict())
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize(
     ("trouble", "error", "words"),
     [

@@ -62,6 +62,7 @@ def intervals_of(mesh: Mesh) -> tuple[Floats, Floats, Floats]:
     return intervals(mesh, every, *ranges(mesh, TOP_M, every), 1e-3)
 
 
+@pytest.mark.first_quick
 @pytest.mark.draws
 @pytest.mark.parametrize("turned", [False, True])
 @pytest.mark.parametrize(("parts", "max_agl_m"), [(2, None), (5, None), (2, 90.0)])

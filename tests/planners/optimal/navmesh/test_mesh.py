@@ -195,6 +195,7 @@ def test_what_the_exact_check_passes_below_the_cap_is_free_in_the_mesh_for_bound
     assert passed > 30
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("limits", LIMITS)
 @pytest.mark.parametrize("world", ["hills", "amsl", "tall", "lids"])
 def test_ways_in_the_mesh_for_paths_pass_the_exact_check(world: str, limits: str) -> None:
@@ -402,8 +403,9 @@ def test_nodes_that_are_looked_at_lie_around_the_cells_that_are_wanted(rows: int
 @pytest.mark.parametrize(
     ("goes_on", "shear"),
     [((False,) * 4, 0.0), ((True, False, True, False), 0.4), ((True,) * 4, 0.0),
-     pytest.param((False,) * 4, 0.4, marks=pytest.mark.slow), pytest.param((True,) * 4, 0.4, marks=pytest.mark.slow),
-     pytest.param((True, False, True, False), 0.0, marks=pytest.mark.slow)],
+     pytest.param((False,) * 4, 0.4, marks=pytest.mark.nightly),
+     pytest.param((True,) * 4, 0.4, marks=pytest.mark.nightly),
+     pytest.param((True, False, True, False), 0.0, marks=pytest.mark.nightly)],
 )  # fmt: skip
 def test_no_track_runs_nearer_to_the_terrains_border_than_ground_must_be_known(
     goes_on: tuple[bool, bool, bool, bool], shear: float

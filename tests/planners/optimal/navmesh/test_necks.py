@@ -45,6 +45,8 @@ def passed(problem: Problem, points: Floats, z: Floats) -> bool:
     return bool(problem.airspace.clear(Legs.between(path[:-1], path[1:], problem.limits), problem.limits).all())
 
 
+@pytest.mark.first_quick
+@pytest.mark.nightly_but("hills-clearance", "tall-clearance", "turned-clearance")
 @pytest.mark.draws
 @pytest.mark.parametrize(
     "limits", ["clearance", *(pytest.param(k, marks=pytest.mark.nightly) for k in ("bare", "errors"))]
@@ -94,6 +96,7 @@ def ridge(gap_m: float, across: bool) -> tuple[Problem, float]:
     return problem, lowest + gap_m
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("at_once", [True, False])
 @pytest.mark.parametrize("across", [False, True])
 @pytest.mark.parametrize("gap_m", [0.02, -0.03])

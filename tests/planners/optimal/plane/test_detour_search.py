@@ -172,6 +172,7 @@ def test_a_little_way_is_won_by_a_bend_and_not_by_laps() -> None:
     assert flown.cost < 1620.0
 
 
+@pytest.mark.slow
 def test_laps_lead_over_a_zone_that_cannot_be_passed_otherwise() -> None:
     # The box reaches from border to border, and is too close to be climbed over on a straight track.
     p = crossing(box(400.0, 0.0, 600.0, 2000.0, None, 90.0))
@@ -188,6 +189,7 @@ def test_with_laps_the_bound_rises_and_stays_below_the_best_path() -> None:
     assert 1700.0 < below.bound <= best
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize(("half_m", "around"), [(150.0, True), (850.0, False)])
 def test_a_zone_entered_below_that_must_be_left_above_is_passed_by_the_shorter_way(half_m: float, around: bool) -> None:
     """A path fits below the zone's western half, but its eastern half stands on a hill, which must be overflown."""

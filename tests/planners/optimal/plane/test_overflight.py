@@ -62,6 +62,7 @@ def test_the_gap_closes_in_tenths_of_a_second(name: str) -> None:
     assert CASES[name].budget.spent < 0.5
 
 
+@pytest.mark.slow
 def test_a_via_in_between_may_be_reached_at_any_altitude() -> None:
     p = mission(box(-150, -300, 150, 300, 100))
     free, high = (
@@ -72,6 +73,7 @@ def test_a_via_in_between_may_be_reached_at_any_altitude() -> None:
     assert high.path.length_m > free.path.length_m
 
 
+@pytest.mark.slow
 def test_the_path_over_a_zone_is_the_best_of_all_sampled_ones() -> None:
     found = plan(CASES["over a corner"])
     # Up to p, level to q, down: over the grown outline of the box, brute force over its sides.

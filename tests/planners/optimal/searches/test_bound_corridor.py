@@ -40,6 +40,7 @@ def through(over_m: float, **more: object) -> Workspace:
     return work
 
 
+@pytest.mark.slow
 def test_a_path_leads_through_a_notch_that_was_passed_by() -> None:
     work = through(0.1)
     below = work.incumbent

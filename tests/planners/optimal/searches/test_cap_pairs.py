@@ -107,6 +107,7 @@ def test_the_bound_meets_the_best_path_where_tracks_and_paths_are_as_long() -> N
     assert met >= 54
 
 
+@pytest.mark.slow
 def test_out_of_time_the_bound_holds_and_nothing_more_is_asked() -> None:
     for seed in range(20):
         for some in (0, 5):
@@ -295,6 +296,7 @@ def test_no_path_past_vias_costs_less_than_the_bound(objective: Objective, climb
     assert near >= 1
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize(("seed", "least_percent"), [(1, 0.04), (13, 0.1), (29, 0.2)])
 def test_fine_tracks_with_a_track_error_pass_as_near_to_terrain_as_allowed(
     seed: int, least_percent: float, monkeypatch: pytest.MonkeyPatch

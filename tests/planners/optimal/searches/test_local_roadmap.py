@@ -42,9 +42,9 @@ def flat(discs: list[tuple[float, float, float]], via: tuple[Via, ...] = (), cle
         ("passes", 2, 0.005),
         ("pockets", 4, 0.03),
         pytest.param("cylinders", 3, 0.02, marks=pytest.mark.slow),
-        pytest.param("passes", 7, 0.005, marks=pytest.mark.slow),
+        pytest.param("passes", 7, 0.005, marks=pytest.mark.nightly),
         pytest.param("rasters", 5, 0.01, marks=pytest.mark.nightly),
-        pytest.param("stops", 1, 0.02, marks=pytest.mark.slow),
+        pytest.param("stops", 1, 0.02, marks=pytest.mark.nightly),
         pytest.param("clearances", 6, 0.01, marks=pytest.mark.slow),
     ],
 )

@@ -58,7 +58,7 @@ def found(problem: Problem) -> Workspace:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("errors", [False, True])
+@pytest.mark.parametrize("errors", [pytest.param(False, marks=pytest.mark.nightly), True])
 @pytest.mark.parametrize(("objective", "climb_deg"), [("length", 90.0), ("length", 12.0), ("energy", 20.0)])
 def test_a_path_drawn_together_costs_no_less_than_the_bound(
     objective: Objective, climb_deg: float, errors: bool
