@@ -63,6 +63,11 @@ INPUT_TEXTS = {
     "position_of_armed_vehicle": "the vehicle is armed: its position may not be on the ground",
     "parameters_not_read": "no parameters could be read: the return altitude is left open",
     "ground_is_flat": "the ground is flat at {flat_m:height} above sea level in this mission: no hill is seen",
+    # -- the declared wind --
+    "wind_of_forecast": (
+        "wind by the forecast {file} for {lat_deg:.4f}, {lon_deg:.4f}, at most {away_m:reach} from the mission's "
+        "places, {hours}"
+    ),
     # -- a file that is checked: its home, its fence, and the hours for which it is judged --
     "home_row_blank": "the file's home row is blank: the vehicle's start in the mission file was taken for home",
     "home_row_elsewhere": (
