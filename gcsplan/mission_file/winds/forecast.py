@@ -90,10 +90,10 @@ class Forecast:
             )
         for name, values in (("wind_speed", self.speed_m_s), ("wind_direction", self.from_deg)):
             for k, level in zip(*np.nonzero(np.isnan(values)), strict=True):
-                raise self._without(f"{name}_{self.agl_m[level]:g}m", k)
+                raise self._without(f"{name}_{self.agl_m[level]:g}m", int(k))
         if self.gust_m_s is not None:
             for k in np.flatnonzero(np.isnan(self.gust_m_s)):
-                raise self._without("wind_gusts_10m", k)
+                raise self._without("wind_gusts_10m", int(k))
 
     def away_m(self, frame: Frame, places_m: Floats) -> float:
         """How far the grid point is from the farthest of ``places_m`` (N, 2) in the plane; inf if it is very far."""
