@@ -90,6 +90,7 @@ from gcsplan.mission_file.zones.draft import (
 from gcsplan.mission_file.zones.keep_in import apart, as_keep_in, place_keep_in
 from gcsplan.notes.note import Note
 from gcsplan.wind.declared import STILL_AIR, DeclaredWind
+from gcsplan.wind.wording import wind_note
 from gcsplan.world.geodesy.frame import Frame
 from gcsplan.world.geometry.zones import KeepIn
 from gcsplan.world.terrain.model_words import notes_on
@@ -417,17 +418,27 @@ class _MissionReading:
         """The declared winds, still air if there are none; None if they have mistakes."""
         if self.raw.get("wind") is None:
             return STILL_AIR
-        where, before = f"{self.where}wind", len(self.problems)
+        before = len(self.problems)
         keys: WindKeys | None = self._section(WindKeys, "wind")
         if keys is None or len(self.problems) > before:
             return None
         if keys.forecast is None:
-            return winds_of(keys, where, self.problems)
+            wind = winds_of(keys, f"{self.where}wind", self.problems)
+        else:
+            wind = self._forecast(keys, hours, frame, places)
+        if wind is not None and not wind.still:
+            self.notes += [wind_note(wind), Note("wind_not_counted")]
+        return wind
+
+    def _forecast(
+        self, keys: WindKeys, hours: Hours | None, frame: Frame | None, places: Sequence[MissionPlace]
+    ) -> DeclaredWind | None:
+        """The winds of a forecast; None if it has mistakes, or its hours or places have."""
         at, departure = self.content.at or self.raw.get("at"), self.content.departure
         if hours is None and at is not None:
-            return None  # it cannot be read, which is reported at its own place
+            return None
         if hours is None or (departure is None and begins_with_day(at)):
-            self.problems.append(Mistake(f"{where}.forecast", NEEDS_DEPARTURE))
+            self.problems.append(Mistake(f"{self.where}wind.forecast", NEEDS_DEPARTURE))
             return None
         if frame is None:
             return None
@@ -435,7 +446,7 @@ class _MissionReading:
             common = Hours.around(departure)
             hours = Hours(min(hours.start, common.start), max(hours.end, common.end))
         in_plane = [place.in_plane(frame) for place in places]
-        made = winds_of_forecast(keys, self.file.parent, hours, frame, in_plane, where, self.problems)
+        made = winds_of_forecast(keys, self.file.parent, hours, frame, in_plane, f"{self.where}wind", self.problems)
         if made is None:
             return None
         self.notes.append(made[1])

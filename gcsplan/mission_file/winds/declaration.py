@@ -86,7 +86,7 @@ def winds_of_forecast(
     wind = DeclaredWind(speed_m_s, from_deg, forecast.agl_m, "agl", forecast.times_s, keys.varying, gust_m_s)
     note = Note(
         "wind_of_forecast", file=Path(keys.forecast).name, lat_deg=forecast.lat_deg, lon_deg=forecast.lon_deg,
-        away_m=away_m, hours=str(hours),
+        away_m=away_m, hours=str(hours), sha256=forecast.sha256,
     )  # fmt: skip
     return wind, note
 

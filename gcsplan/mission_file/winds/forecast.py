@@ -7,6 +7,7 @@ read, and the gusts at 10 m if they are there. Everything else in the file is le
 
 from __future__ import annotations
 
+import hashlib
 import math
 import re
 from dataclasses import dataclass, replace
@@ -49,7 +50,8 @@ class Forecast:
     """Winds at T times and L heights above ground; numbers that the file lacks are NaN.
 
     ``times_s`` (T,) rise, seconds UTC since 1970, and ``agl_m`` (L,) rise. ``speed_m_s``, ``from_deg`` are (T, L),
-    ``gust_m_s`` is (T,), or None if the file has no gusts. ``where`` is the file's name in messages.
+    ``gust_m_s`` is (T,), or None if the file has no gusts. ``where`` is the file's name in messages, ``sha256`` the sum
+    of its bytes.
     """
 
     where: str
@@ -60,6 +62,7 @@ class Forecast:
     speed_m_s: Floats
     from_deg: Floats
     gust_m_s: Floats | None
+    sha256: str = ""
 
     def within(self, hours: Hours) -> Forecast:
         """The times that hold ``hours``: from the last before them to the first after them. Raises InputError."""
@@ -113,7 +116,8 @@ class Forecast:
 
 def read_forecast(path: Path, where: str) -> Forecast:
     """The forecast in a file; ``where`` is the key that names it. Raises InputError."""
-    whole = load_json(path, _bytes(path, where))
+    data = _bytes(path, where)
+    whole = load_json(path, data)
     at = str(path)
     if isinstance(whole, list):
         raise InputError(f"holds forecasts of {len(whole)} places; ask for one place, the mission's", where=at)
@@ -136,7 +140,7 @@ def read_forecast(path: Path, where: str) -> Forecast:
     gusts = None if hourly.get("wind_gusts_10m") is None else _speed(hourly, units, "wind_gusts_10m", len(times_s), at)
     return Forecast(
         at, _degrees(whole, "latitude", 90.0, at), _degrees(whole, "longitude", 360.0, at), times_s,
-        agl_m[np.array(known)], np.stack(speed, axis=1), np.stack(turned, axis=1), gusts,
+        agl_m[np.array(known)], np.stack(speed, axis=1), np.stack(turned, axis=1), gusts, hashlib.sha256(data).hexdigest(),
     )  # fmt: skip
 
 
