@@ -77,7 +77,7 @@ from gcsplan.mission_file.vehicles import (
     within_vel_max,
 )
 from gcsplan.mission_file.window import GroundWindow, MissionPlane, known_in_plane, opened
-from gcsplan.mission_file.winds.declaration import NEEDS_DEPARTURE, winds_of, winds_of_forecast
+from gcsplan.mission_file.winds.declaration import NEEDS_DEPARTURE, go_together, winds_of, winds_of_forecast
 from gcsplan.mission_file.zones.draft import (
     ZoneDraft,
     looks_swapped,
@@ -420,10 +420,11 @@ class _MissionReading:
             return STILL_AIR
         before = len(self.problems)
         keys: WindKeys | None = self._section(WindKeys, "wind")
-        if keys is None or len(self.problems) > before:
+        where = f"{self.where}wind"
+        if keys is None or len(self.problems) > before or not go_together(keys, where, self.problems):
             return None
         if keys.forecast is None:
-            wind = winds_of(keys, f"{self.where}wind", self.problems)
+            wind = winds_of(keys, where, self.problems)
         else:
             wind = self._forecast(keys, hours, frame, places)
         if wind is not None and not wind.still:

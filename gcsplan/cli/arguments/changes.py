@@ -78,7 +78,7 @@ _NAMED = re.compile(r"([A-Za-z0-9_-]{1,64})=(.*)", re.DOTALL)
 def changes_of(
     avoid: Sequence[str] | None, avoid_file: Sequence[str] | None, zones: Sequence[str] | None,
     limits: dict[str, Sequence[str] | None], places: dict[str, Sequence[str] | None], via: Sequence[str] | None,
-    speed: Sequence[str] | None, terrain: dict[str, object], wind: str | None,
+    speed: Sequence[str] | None, terrain: dict[str, object], wind: str | None = None,
 ) -> list[MissionChange]:  # fmt: skip
     """The changes, in the order in which they are made. ``limits``, ``places``: by their keys in the mission file.
 

@@ -28,18 +28,39 @@ NEEDS_DEPARTURE = (
 )
 
 
+def go_together(keys: WindKeys, where: str, problems: list[Mistake]) -> bool:
+    """Whether one thing is declared, with no key of another."""
+    before = len(problems)
+    forms = [form for form in FORMS if getattr(keys, form) is not None]
+    if len(forms) != 1:
+        given = " and ".join(forms) or "none"
+        choices = "give one of speed_m_s (with from_deg), up_to_m_s (any direction), levels and forecast"
+        problems.append(Mistake(where, f"{choices}, given {given}"))
+        return False
+    form = forms[0]
+    if keys.from_deg is not None and form != "speed_m_s":
+        cure = {
+            "up_to_m_s": "leave it out, for up_to_m_s means any direction; or give speed_m_s: [0, …] with it",
+            "levels": "give each level its own",
+            "forecast": "leave it out, for the forecast has directions; from_error_deg widens them",
+        }[form]
+        problems.append(Mistake(f"{where}.from_deg", f"belongs to speed_m_s; {cure}"))
+    for key, cure in (("speed_error_m_s", "speed_m_s: [3, 7]"), ("from_error_deg", "from_deg: [250, 290]")):
+        if getattr(keys, key) is not None and form != "forecast":
+            problems.append(Mistake(f"{where}.{key}", f"belongs to a forecast; give a range, such as {cure}"))
+    return len(problems) == before
+
+
 def winds_of(keys: WindKeys, where: str, problems: list[Mistake]) -> DeclaredWind | None:
     """The winds whose numbers stand in the mission; None, and ``problems``, if they are none."""
     before = len(problems)
-    _require_one_form(keys, where, problems)
     if keys.levels is not None:
         heights, heights_m = _heights(keys.levels, f"{where}.levels", problems)
         ranges = [(level.speed_m_s, level.from_deg) for level in keys.levels]
     else:
         heights, heights_m, ranges = "agl", [0.0], [_one(keys, where, problems)]
     speed_m_s, from_deg = (np.array([list(values)]) for values in zip(*ranges, strict=True))
-    _require_gust(keys, float(speed_m_s.max()), where, problems)
-    if len(problems) > before:
+    if not _gust_is_fastest(keys, float(speed_m_s.max()), where, problems) or len(problems) > before:
         return None
     return DeclaredWind(
         speed_m_s, from_deg, np.array(heights_m), heights, varying=keys.varying, gust_m_s=keys.gust_m_s
@@ -54,13 +75,9 @@ def winds_of_forecast(
     cannot be read, or does not hold the hours or the ``places_m`` of the mission's plane."""
     from gcsplan.mission_file.winds.forecast import FARTHEST_M, read_forecast  # most missions name no forecast
 
-    before = len(problems)
-    _require_one_form(keys, where, problems)
-    if len(problems) > before or keys.forecast is None:
-        return None
-    at = f"{where}.forecast"
+    at, file = f"{where}.forecast", Path(keys.forecast or "")
     try:
-        forecast = read_forecast(folder / keys.forecast, at).within(hours)
+        forecast = read_forecast(folder / file, at).within(hours)
     except InputError as why:
         problems += why.problems
         return None
@@ -77,15 +94,14 @@ def winds_of_forecast(
     speed_m_s = np.stack([np.maximum(forecast.speed_m_s - error_m_s, 0.0), forecast.speed_m_s + error_m_s], axis=-1)
     from_deg = np.stack([forecast.from_deg - error_deg, forecast.from_deg + error_deg], axis=-1)
     most_m_s = float(speed_m_s.max())
-    _require_gust(keys, most_m_s, where, problems)
-    if len(problems) > before:
+    if not _gust_is_fastest(keys, most_m_s, where, problems):
         return None
     gust_m_s = keys.gust_m_s
     if gust_m_s is None and forecast.gust_m_s is not None:
         gust_m_s = most_m_s + _gusts_add_m_s(forecast.speed_m_s[:, 0], forecast.gust_m_s)
     wind = DeclaredWind(speed_m_s, from_deg, forecast.agl_m, "agl", forecast.times_s, keys.varying, gust_m_s)
     note = Note(
-        "wind_of_forecast", file=Path(keys.forecast).name, lat_deg=forecast.lat_deg, lon_deg=forecast.lon_deg,
+        "wind_of_forecast", file=file.name, lat_deg=forecast.lat_deg, lon_deg=forecast.lon_deg,
         away_m=away_m, hours=str(hours), sha256=forecast.sha256,
     )  # fmt: skip
     return wind, note
@@ -97,27 +113,6 @@ def _gusts_add_m_s(lowest_m_s: Floats, gust_m_s: Floats) -> float:
     A gust adds as much at the other heights, where a forecast has none.
     """
     return float(np.maximum(gust_m_s - lowest_m_s, 0.0).max())
-
-
-def _require_one_form(keys: WindKeys, where: str, problems: list[Mistake]) -> None:
-    """Report keys that do not go together."""
-    forms = [form for form in FORMS if getattr(keys, form) is not None]
-    if len(forms) != 1:
-        given = " and ".join(forms) or "none"
-        choices = "give one of speed_m_s (with from_deg), up_to_m_s (any direction), levels and forecast"
-        problems.append(Mistake(where, f"{choices}, given {given}"))
-        return
-    form = forms[0]
-    if keys.from_deg is not None and form != "speed_m_s":
-        cure = {
-            "up_to_m_s": "leave it out, for up_to_m_s means any direction; or give speed_m_s: [0, …] with it",
-            "levels": "give each level its own",
-            "forecast": "leave it out, for the forecast has directions; from_error_deg widens them",
-        }[form]
-        problems.append(Mistake(f"{where}.from_deg", f"belongs to speed_m_s; {cure}"))
-    for key, cure in (("speed_error_m_s", "speed_m_s: [3, 7]"), ("from_error_deg", "from_deg: [250, 290]")):
-        if getattr(keys, key) is not None and form != "forecast":
-            problems.append(Mistake(f"{where}.{key}", f"belongs to a forecast; give a range, such as {cure}"))
 
 
 def _one(keys: WindKeys, where: str, problems: list[Mistake]) -> tuple[list[float], list[float]]:
@@ -155,7 +150,10 @@ def _heights(levels: Sequence[WindLevelKeys], where: str, problems: list[Mistake
     return found[0][0], [height for _, height in found]
 
 
-def _require_gust(keys: WindKeys, most_m_s: float, where: str, problems: list[Mistake]) -> None:
-    if keys.gust_m_s is not None and keys.gust_m_s < most_m_s - ROUNDING_M_S:
-        words = f"must be at least the fastest wind, {most_m_s:.4g} m/s, given {keys.gust_m_s:.4g}"
-        problems.append(Mistake(f"{where}.gust_m_s", f"{words}; leave it out if there are no gusts"))
+def _gust_is_fastest(keys: WindKeys, most_m_s: float, where: str, problems: list[Mistake]) -> bool:
+    """Whether no wind is faster than the gusts, if there are any."""
+    if keys.gust_m_s is None or keys.gust_m_s >= most_m_s - ROUNDING_M_S:
+        return True
+    words = f"must be at least the fastest wind, {most_m_s:.4g} m/s, given {keys.gust_m_s:.4g}"
+    problems.append(Mistake(f"{where}.gust_m_s", f"{words}; leave it out if there are no gusts"))
+    return False
