@@ -446,8 +446,12 @@ class _MissionReading:
         if departure is not None:
             common = Hours.around(departure)
             hours = Hours(min(hours.start, common.start), max(hours.end, common.end))
+        from gcsplan.mission_file.winds.forecast import read_forecast  # imported here: most missions name no forecast
+
+        path = self.file.parent / str(keys.forecast)
+        read = partial(self.kept.forecast.get, path, partial(read_forecast, path, f"{self.where}wind.forecast"))
         in_plane = [place.in_plane(frame) for place in places]
-        made = winds_of_forecast(keys, self.file.parent, hours, frame, in_plane, f"{self.where}wind", self.problems)
+        made = winds_of_forecast(keys, read, hours, frame, in_plane, f"{self.where}wind", self.problems)
         if made is None:
             return None
         self.notes.append(made[1])

@@ -126,7 +126,7 @@ def test_a_saved_file_keeps_every_comment_and_all_lines_that_did_not_change(tmp_
     assert "avoid 1" in [zone.name for zone in again.zones]
 
 
-def test_another_wind_replaces_the_whole_section_and_its_file_is_seen_from_the_mission(tmp_path: Path) -> None:
+def test_another_wind_replaces_the_section_and_names_its_file_from_the_mission(tmp_path: Path) -> None:
     raw = {"wind": {"speed_kt": 9, "from_deg": 3}}
     change = MissionChange("--wind a.json", "wind", "wind", {"forecast": str(tmp_path / "a.json")})
     made = changed(raw, [change], tmp_path / "missions")

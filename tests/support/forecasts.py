@@ -9,7 +9,7 @@ HOURS = [f"2026-11-28T{hour:02d}:00" for hour in range(10, 16)]
 
 
 def forecast(**changes: Any) -> dict[str, Any]:
-    """Six hours at two heights, 36 km/h at 10 m and 72 km/h at 80 m in the first, 3.6 km/h more in each that follows."""
+    """Six hours at two heights: 36 km/h at 10 m and 72 km/h at 80 m at first, and 3.6 km/h more every hour."""
     hourly = {
         "time": HOURS,
         "wind_speed_10m": [36.0 + 3.6 * k for k in range(6)],

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from gcsplan.units import Units
     from gcsplan.wind.declared import DeclaredWind
 
-MOST_ROWS = 60
+MOST_WIND_ROWS = 60
 """Heights and hours that are printed at most; JSON has all."""
 
 NOTED = ("wind_declared", "wind_of_forecast", "wind_not_counted")
@@ -67,11 +67,11 @@ def _print(winds: DeclaredWind, units: Units) -> None:
     columns = [("hour (UTC)", False), (f"{height.symbol}{zero}", True), ("speed", True), ("from", True)]
     table = new_table("", columns if several else columns[1:])
     rows = [(t, h) for t in range(len(winds.times_s)) for h in range(len(winds.heights_m))]
-    for t, h in rows[:MOST_ROWS]:
+    for t, h in rows[:MOST_WIND_ROWS]:
         hour = f"{datetime.fromtimestamp(float(winds.times_s[t]), UTC):%Y-%m-%d %H:%M}"
         at = f"{height.of(float(winds.heights_m[h])):.0f}" if len(winds.heights_m) > 1 else "any"
         cells = speeds_note(winds.speed_m_s[t, h]), directions_note(winds.from_deg[t, h])
         table.add_row(*([hour] if several else []), at, *(cell.text(wording) for cell in cells))
     console.print(table, soft_wrap=False)
-    if len(rows) > MOST_ROWS:
-        remark(f"and {len(rows) - MOST_ROWS} more: --json has all")
+    if len(rows) > MOST_WIND_ROWS:
+        remark(f"and {len(rows) - MOST_WIND_ROWS} more: --json has all")

@@ -32,7 +32,7 @@ LEAST_POSITIVE = 1e-3
 
 MOST_VOLTS = 10_000.0
 
-MOST_WIND_M_S = 75.0
+MOST_DECLARED_M_S = 75.0
 """Fastest wind that a mission may declare: faster than any gust in which an aircraft of these kinds has flown."""
 
 
@@ -107,7 +107,7 @@ if TYPE_CHECKING:  # one number becomes two
     WindSpeeds = list[float]
     WindDirections = list[float]
 else:
-    _WindSpeed = Annotated[float, Field(ge=0.0, le=MOST_WIND_M_S)]
+    _WindSpeed = Annotated[float, Field(ge=0.0, le=MOST_DECLARED_M_S)]
     _Bearing = Annotated[float, Field(ge=0.0, le=360.0)]
 
     def _one_or_range(kind: Any) -> Any:
@@ -116,7 +116,7 @@ else:
 
     WindSpeeds = Annotated[
         Annotated[_one_or_range(_WindSpeed), Discriminator(_count)],
-        BeforeValidator(_speeds_with_error), AfterValidator(_rising), _number_range_or_text(MOST_WIND_M_S, "5 ± 2"),
+        BeforeValidator(_speeds_with_error), AfterValidator(_rising), _number_range_or_text(MOST_DECLARED_M_S, "5 ± 2"),
     ]  # fmt: skip
     WindDirections = Annotated[
         Annotated[_one_or_range(_Bearing), Discriminator(_count)],
@@ -393,17 +393,17 @@ class WindKeys(Keys):
     """Speed of the wind, at every height; a range [lowest, highest], also as `5 ± 2`, is one unknown wind in it."""
     from_deg: WindDirections | None = None
     """Direction it comes from, clockwise from true north; or a range clockwise ([350, 20]), also as `270 ± 20`."""
-    up_to_m_s: Annotated[float, Field(ge=0.0, le=MOST_WIND_M_S)] | None = None
+    up_to_m_s: Annotated[float, Field(ge=0.0, le=MOST_DECLARED_M_S)] | None = None
     """One unknown wind of at most this speed, from any direction."""
     levels: Annotated[list[WindLevelKeys], Field(min_length=1, max_length=100)] | None = None
     """The wind by height, upwards: linear between two levels, and as the nearest level below and above all."""
     forecast: Text | None = None
     """A file as Open-Meteo's forecast API returns it (JSON, hourly wind); `at` must say when the flight begins."""
-    speed_error_m_s: Annotated[float, Field(ge=0.0, le=MOST_WIND_M_S)] | None = None
+    speed_error_m_s: Annotated[float, Field(ge=0.0, le=MOST_DECLARED_M_S)] | None = None
     """With `forecast`: how much faster or slower the wind may be; if absent, 0."""
     from_error_deg: Annotated[float, Field(ge=0.0, le=180.0)] | None = None
     """With `forecast`: how far to either side of the forecast's direction it may come from; if absent, 0."""
-    gust_m_s: Annotated[float, Field(ge=0.0, le=MOST_WIND_M_S)] | None = None
+    gust_m_s: Annotated[float, Field(ge=0.0, le=MOST_DECLARED_M_S)] | None = None
     """Highest speed in a gust, at least that of the wind; if absent, no gusts, or a forecast's own."""
     varying: bool = False
     """Whether the wind may be any of these at each place and time, instead of one during the whole flight."""

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,8 +17,14 @@ from gcsplan.notes.note import Note
 from gcsplan.wind.declared import DeclaredWind, WindHeights
 from gcsplan.world.geodesy.frame import Frame
 
-FORMS = ("speed_m_s", "up_to_m_s", "levels", "forecast")
+if TYPE_CHECKING:
+    from gcsplan.mission_file.winds.forecast import Forecast
+
+WIND_FORMS = ("speed_m_s", "up_to_m_s", "levels", "forecast")
 """The keys that say what blows; a mission has one of them."""
+
+FARTHEST_GRID_M = 30_000.0
+"""Farthest that a mission's places may lie from a forecast's grid point; global models have one every 25 km or so."""
 
 ROUNDING_M_S = 1e-6
 """Difference of two speeds that were the same in another unit."""
@@ -31,7 +38,7 @@ NEEDS_DEPARTURE = (
 def go_together(keys: WindKeys, where: str, problems: list[Mistake]) -> bool:
     """Whether one thing is declared, with no key of another."""
     before = len(problems)
-    forms = [form for form in FORMS if getattr(keys, form) is not None]
+    forms = [form for form in WIND_FORMS if getattr(keys, form) is not None]
     if len(forms) != 1:
         given = " and ".join(forms) or "none"
         choices = "give one of speed_m_s (with from_deg), up_to_m_s (any direction), levels and forecast"
@@ -68,27 +75,24 @@ def winds_of(keys: WindKeys, where: str, problems: list[Mistake]) -> DeclaredWin
 
 
 def winds_of_forecast(
-    keys: WindKeys, folder: Path, hours: Hours, frame: Frame, places_m: Sequence[tuple[float, float]], where: str,
-    problems: list[Mistake],
+    keys: WindKeys, read: Callable[[], Forecast], hours: Hours, frame: Frame, places_m: Sequence[tuple[float, float]],
+    where: str, problems: list[Mistake],
 ) -> tuple[DeclaredWind, Note] | None:  # fmt: skip
     """The winds of the forecast that ``keys`` name, within ``hours``, and a note on it; None, and ``problems``, if it
     cannot be read, or does not hold the hours or the ``places_m`` of the mission's plane."""
-    from gcsplan.mission_file.winds.forecast import FARTHEST_M, read_forecast  # most missions name no forecast
-
-    at, file = f"{where}.forecast", Path(keys.forecast or "")
     try:
-        forecast = read_forecast(folder / file, at).within(hours)
+        forecast = read().within(hours)
     except InputError as why:
         problems += why.problems
         return None
     away_m = forecast.away_m(frame, np.array(places_m))
-    if away_m > FARTHEST_M:
+    if away_m > FARTHEST_GRID_M:
         words = (
-            f"is for {forecast.lat_deg:.4f}, {forecast.lon_deg:.4f}, more than {FARTHEST_M / 1000.0:.0f} km from a "
-            f"place of the mission; get the forecast for {frame.lat_deg:.4f}, {frame.lon_deg:.4f}, or declare winds "
+            f"is for {forecast.lat_deg:.4f}, {forecast.lon_deg:.4f}, more than {FARTHEST_GRID_M / 1000.0:.0f} km from "
+            f"a place of the mission; get the forecast for {frame.lat_deg:.4f}, {frame.lon_deg:.4f}, or declare winds "
             "that hold everywhere (`up_to_m_s`)"
         )
-        problems.append(Mistake(at, words))
+        problems.append(Mistake(f"{where}.forecast", words))
         return None
     error_m_s, error_deg = keys.speed_error_m_s or 0.0, keys.from_error_deg or 0.0
     speed_m_s = np.stack([np.maximum(forecast.speed_m_s - error_m_s, 0.0), forecast.speed_m_s + error_m_s], axis=-1)
@@ -101,7 +105,7 @@ def winds_of_forecast(
         gust_m_s = most_m_s + _gusts_add_m_s(forecast.speed_m_s[:, 0], forecast.gust_m_s)
     wind = DeclaredWind(speed_m_s, from_deg, forecast.agl_m, "agl", forecast.times_s, keys.varying, gust_m_s)
     note = Note(
-        "wind_of_forecast", file=file.name, lat_deg=forecast.lat_deg, lon_deg=forecast.lon_deg,
+        "wind_of_forecast", file=Path(keys.forecast or "").name, lat_deg=forecast.lat_deg, lon_deg=forecast.lon_deg,
         away_m=away_m, hours=str(hours), sha256=forecast.sha256,
     )  # fmt: skip
     return wind, note

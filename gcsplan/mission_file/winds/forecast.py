@@ -20,7 +20,7 @@ import numpy as np
 from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
 from gcsplan.mission_file.published.times import Hours
-from gcsplan.mission_file.values.schema import MOST_WIND_M_S, shown
+from gcsplan.mission_file.values.schema import MOST_DECLARED_M_S, shown
 from gcsplan.mission_file.zones.attributes import is_number
 from gcsplan.mission_file.zones.contents import load_json
 from gcsplan.units import KM_PER_HOUR, KNOT, METRE_PER_SECOND, MILE_PER_HOUR
@@ -29,9 +29,6 @@ from gcsplan.world.terrain.input_files import absent, tell_file
 
 MOST_FORECAST_BYTES = 5_000_000
 """Largest file that is read: 16 days of every height take 100 kB."""
-
-FARTHEST_M = 30_000.0
-"""Farthest that a mission's places may lie from the grid point; global models have one every 25 km or so."""
 
 LONGEST_STEP_S = 6.0 * 3600.0
 """Longest time between two hours, between which the wind is linear."""
@@ -138,9 +135,11 @@ def read_forecast(path: Path, where: str) -> Forecast:
     speed = [_speed(hourly, units, f"wind_speed_{name}m", len(times_s), at) for name in names]
     turned = [_direction(hourly, f"wind_direction_{name}m", len(times_s), at) for name in names]
     gusts = None if hourly.get("wind_gusts_10m") is None else _speed(hourly, units, "wind_gusts_10m", len(times_s), at)
+    gusts = None if gusts is None or np.isnan(gusts).all() else gusts
     return Forecast(
         at, _degrees(whole, "latitude", 90.0, at), _degrees(whole, "longitude", 360.0, at), times_s,
-        agl_m[np.array(known)], np.stack(speed, axis=1), np.stack(turned, axis=1), gusts, hashlib.sha256(data).hexdigest(),
+        agl_m[np.array(known)], np.stack(speed, axis=1), np.stack(turned, axis=1), gusts,
+        hashlib.sha256(data).hexdigest(),
     )  # fmt: skip
 
 
@@ -217,7 +216,7 @@ def _speed(hourly: dict[str, Any], units: dict[str, Any], name: str, count: int,
         raise InputError(f"must be one of {', '.join(SPEED_UNITS)}, given {shown(unit)}",
                          where=f"{at}: hourly_units.{name}")  # fmt: skip
     speeds = _column(hourly, name, count, at) * SPEED_UNITS[unit].size
-    _require_between(speeds, MOST_WIND_M_S, f"{at}: hourly.{name}", "m/s")
+    _require_between(speeds, MOST_DECLARED_M_S, f"{at}: hourly.{name}", "m/s")
     return speeds
 
 

@@ -84,7 +84,7 @@ def test_a_wind_is_the_section_of_a_mission(text: str, section: dict[str, Any]) 
 
 @pytest.mark.parametrize("text", ["5", "", "north", "5,270,9,1", "up-to:", "up-to:1,2,3", "-5,270", "5,nan", "3-,270"])
 def test_a_text_that_is_no_wind_is_refused_with_the_forms(text: str) -> None:
-    with pytest.raises(UsageError, match="--wind .*: give"):
+    with pytest.raises(UsageError, match=r"--wind .*: give"):
         wind_changes(text)
 
 
