@@ -41,7 +41,7 @@ def wind(
     source = load_mission(mission, at=at, changes=wind_changes(wind))
     options = dict(() if source.content is None else source.content.options)
     declared = source.content is not None and source.content.given.get("wind") is not None
-    by = options.get("wind", "wind") if declared else None
+    by = options.get("wind", "the key `wind`") if declared else None
     notes = [note for note in source.notes if note.code in NOTED]
     if as_json:
         departure = None if source.departure is None else source.departure.isoformat()
@@ -51,7 +51,7 @@ def wind(
     if not source.wind.still:
         _print(source.wind, system)
     say(wind_note(source.wind).text(wording))
-    say(f"by {by}" if by is not None else "the mission has no key `wind`")
+    say(f"declared by {by}" if by is not None else "the mission has no key `wind`")
     say_notes([note for note in notes if note.code != "wind_declared"], wording)
 
 

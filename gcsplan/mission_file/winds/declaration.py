@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gcsplan.arrays import Floats
 from gcsplan.errors import InputError, Mistake
 from gcsplan.mission_file.published.times import Hours
 from gcsplan.mission_file.values.schema import WindKeys, WindLevelKeys
@@ -102,21 +101,13 @@ def winds_of_forecast(
         return None
     gust_m_s = keys.gust_m_s
     if gust_m_s is None and forecast.gust_m_s is not None:
-        gust_m_s = most_m_s + _gusts_add_m_s(forecast.speed_m_s[:, 0], forecast.gust_m_s)
+        gust_m_s = most_m_s + forecast.gusts_add_m_s()
     wind = DeclaredWind(speed_m_s, from_deg, forecast.agl_m, "agl", forecast.times_s, keys.varying, gust_m_s)
     note = Note(
         "wind_of_forecast", file=Path(keys.forecast or "").name, lat_deg=forecast.lat_deg, lon_deg=forecast.lon_deg,
         away_m=away_m, hours=str(hours), sha256=forecast.sha256,
     )  # fmt: skip
     return wind, note
-
-
-def _gusts_add_m_s(lowest_m_s: Floats, gust_m_s: Floats) -> float:
-    """How far the gusts (T,), which are those at the lowest height, exceed the wind (T,) there at most, m/s.
-
-    A gust adds as much at the other heights, where a forecast has none.
-    """
-    return float(np.maximum(gust_m_s - lowest_m_s, 0.0).max())
 
 
 def _one(keys: WindKeys, where: str, problems: list[Mistake]) -> tuple[list[float], list[float]]:

@@ -36,6 +36,9 @@ LONGEST_STEP_S = 6.0 * 3600.0
 SPEED_UNITS = {"m/s": METRE_PER_SECOND, "km/h": KM_PER_HOUR, "kn": KNOT, "mp/h": MILE_PER_HOUR}
 """The units of speed that the API has, by its own names."""
 
+GUSTS_AGL_M = 10.0
+"""The height of a forecast's gusts."""
+
 ASK = "ask Open-Meteo for hourly=wind_speed_10m,wind_direction_10m,wind_gusts_10m and the same speeds and directions "\
     "at 80m, 120m and 180m"  # fmt: skip
 
@@ -95,6 +98,17 @@ class Forecast:
             for k in np.flatnonzero(np.isnan(self.gust_m_s)):
                 raise self._without("wind_gusts_10m", int(k))
 
+    def gusts_add_m_s(self) -> float:
+        """How far the gusts exceed the wind at their height at most, m/s; they add as much at the other heights.
+
+        The gusts of an hour are the highest since the hour before it, so the lower wind of both counts.
+        """
+        if self.gust_m_s is None:
+            return 0.0
+        speed = self.speed_m_s[:, self.agl_m == GUSTS_AGL_M][:, 0]
+        lower = np.minimum(speed, np.concatenate([speed[:1], speed[:-1]]))
+        return float(np.maximum(self.gust_m_s - lower, 0.0).max())
+
     def away_m(self, frame: Frame, places_m: Floats) -> float:
         """How far the grid point is from the farthest of ``places_m`` (N, 2) in the plane; inf if it is very far."""
         away = np.hypot(*(places_m - frame.to_plane(self.lat_deg, self.lon_deg)).T)
@@ -136,9 +150,12 @@ def read_forecast(path: Path, where: str) -> Forecast:
     turned = [_direction(hourly, f"wind_direction_{name}m", len(times_s), at) for name in names]
     gusts = None if hourly.get("wind_gusts_10m") is None else _speed(hourly, units, "wind_gusts_10m", len(times_s), at)
     gusts = None if gusts is None or np.isnan(gusts).all() else gusts
+    heights = agl_m[np.array(known)]
+    if gusts is not None and GUSTS_AGL_M not in heights:
+        raise InputError(f"has gusts at {GUSTS_AGL_M:g} m without the wind there; {ASK}", where=at)
     return Forecast(
         at, _degrees(whole, "latitude", 90.0, at), _degrees(whole, "longitude", 360.0, at), times_s,
-        agl_m[np.array(known)], np.stack(speed, axis=1), np.stack(turned, axis=1), gusts,
+        heights, np.stack(speed, axis=1), np.stack(turned, axis=1), gusts,
         hashlib.sha256(data).hexdigest(),
     )  # fmt: skip
 

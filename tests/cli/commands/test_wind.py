@@ -31,13 +31,13 @@ def test_the_winds_of_a_file_are_a_table_by_height(run: Any, file: Path) -> None
         ["100", "5.0", "to", "7.0", "m/s", "350°", "to", "10°"],
     ]
     assert "declared wind: 3.0 to 7.0 m/s from 250° to 10°; another one at each place and time; gusts up to 9.0" in out
-    assert "by wind" in out
+    assert "declared by the key `wind`" in out
 
 
 def test_an_option_counts_in_place_of_the_file_and_units_are_the_readers(run: Any, file: Path) -> None:
     out = run("wind", file, "--wind", "5,270", "--units", "aviation")[1]
     assert "9.7 kt" in out
-    assert "by --wind 5,270" in out
+    assert "declared by --wind 5,270" in out
     assert "still air" in run("wind", file, "--wind", "still")[1]
 
 

@@ -64,6 +64,12 @@ def test_every_form_is_one_set_of_winds_at_all_heights(wind: Any, speeds: Any, d
     assert (made.heights_m.tolist(), made.varying, made.gust_m_s) == ([0.0], False, None)
 
 
+def test_errors_need_no_quotes_in_yaml() -> None:
+    text = mission() + "wind: {speed_m_s: 5 ± 2, from_deg: 270 +- 20, gust_m_s: 9}\n"
+    made = load_mission("m.yaml", text=text).wind
+    assert (made.speed_m_s[0, 0].tolist(), made.from_deg[0, 0].tolist()) == ([3.0, 7.0], [250.0, 290.0])
+
+
 def test_knots_kilometres_per_hour_and_feet_are_understood() -> None:
     assert load({"speed_kt": 10, "from_deg": 0}).wind.most_m_s == pytest.approx(10 * KNOT.size)
     assert load({"speed_kt": "10 ± 2", "from_deg": 0}).wind.most_m_s == pytest.approx(12 * KNOT.size)
@@ -180,7 +186,7 @@ def test_a_forecast_counts_in_the_missions_hours(tmp_path: Path) -> None:
     assert wind.heights_m.tolist() == [10.0, 80.0]
     assert wind.speed_m_s[0].tolist() == pytest.approx(np.array([[11.0, 11.0], [21.0, 21.0]]))
     assert wind.from_deg[:, 1, 0].tolist() == [5.0, 10.0, 15.0, 20.0]
-    assert wind.gusts_add_m_s == pytest.approx(6.0)  # 64.8 km/h in a wind of 43.2 at 10 m
+    assert wind.gusts_add_m_s == pytest.approx(7.0)
     [note] = [n for n in source.notes if n.code == "wind_of_forecast"]
     assert "f.json for 47.0000, 8.0100" in str(note)
 
@@ -190,7 +196,7 @@ def test_errors_widen_a_forecast(tmp_path: Path) -> None:
     assert wind.speed_m_s[0, 0].tolist() == pytest.approx([0.0, 23.0])
     assert wind.from_deg[0, 0].tolist() == [335.0, 375.0]
     assert wind.gust_m_s == 50.0
-    assert of_forecast(tmp_path, speed_error_m_s=2).wind.gusts_add_m_s == pytest.approx(6.0)
+    assert of_forecast(tmp_path, speed_error_m_s=2).wind.gusts_add_m_s == pytest.approx(7.0)
 
 
 def test_a_forecast_needs_the_time_of_departure(tmp_path: Path) -> None:

@@ -57,6 +57,13 @@ def test_a_height_of_which_a_model_knows_nothing_is_left_and_gusts_may_be_absent
     assert made.gust_m_s is None
 
 
+def test_gusts_add_what_exceeds_the_lower_wind_of_their_hour(tmp_path: Path) -> None:
+    made = read(tmp_path, forecast()).within(hours("10:00", "12:00"))
+    assert made.gusts_add_m_s() == pytest.approx(7.0)  # 18 m/s since 10 o'clock UTC, where the wind was 11 m/s
+    gustless = read(tmp_path, forecast(hourly__wind_gusts_10m=[None] * 6))
+    assert (gustless.gust_m_s, gustless.gusts_add_m_s()) == (None, 0.0)
+
+
 def test_hours_are_cut_to_the_flight_and_the_hours_around_it(tmp_path: Path) -> None:
     made = read(tmp_path, forecast())
     assert len(made.within(hours("10:00", "12:00")).times_s) == 3
@@ -106,6 +113,7 @@ def test_missing_hours_are_refused(tmp_path: Path) -> None:
         ({"hourly__wind_direction_10m": [361] * 6}, r"wind_direction_10m\[0\]: must be 0 to 360"),
         ({"hourly_units__wind_speed_10m": "Bft"}, "hourly_units.wind_speed_10m: must be one of m/s, km/h, kn, mp/h"),
         ({"hourly_units__wind_gusts_10m": ...}, "hourly_units.wind_gusts_10m: must be one of"),
+        ({"hourly__wind_speed_10m": [None] * 6}, "has gusts at 10 m without the wind there"),
         ({"hourly__wind_speed_10m": [None] * 6, "hourly__wind_speed_80m": [None] * 6}, "has no speed at any hour"),
         ({"hourly__wind_speed_10m": ..., "hourly__wind_speed_80m": ...}, "has no wind_speed_10m in hourly"),
     ],
