@@ -121,7 +121,7 @@ def _value(key: str, entry: Mapping[str, Any], named: Mapping[str, Any]) -> str:
         "boolean": "`true`, `false`",
     }
     kind = names[entry["type"]]
-    unit = units.UNIT_SYMBOLS.get(units.unit_end(key), "")
+    unit = "" if kind == "text" else units.UNIT_SYMBOLS.get(units.unit_end(key), "")
     return ", ".join(word for word in (unit or kind, _bounds(entry)) if word)
 
 

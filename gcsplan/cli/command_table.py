@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from gcsplan.cli.commands import batch, check, new, plan, rehearse, schema
+from gcsplan.cli.commands import batch, check, new, plan, rehearse, schema, wind
 from gcsplan.cli.commands import fit_energy as energy
 from gcsplan.cli.commands import sim as fly
 from gcsplan.cli.commands import vehicles as links
@@ -41,6 +41,7 @@ app.command(short_help="Is exactly this file on board?")(links.verify)
 app.command()(links.download)
 app.command(short_help="Remove the mission, fence or rally points.")(links.clear)
 app.command(short_help="Loopback vehicles that take missions.")(fly.sim)
+app.command(short_help="The winds of a mission, as they are understood.")(wind.wind)
 app.command("fit-energy", short_help="The energy model out of flight logs.")(energy.fit_energy)
 app.command()(plan.planners)
 app.command(short_help="The JSON Schema of a mission file, for editors.")(schema.schema)

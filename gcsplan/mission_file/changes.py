@@ -10,7 +10,7 @@ import codecs
 import copy
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -32,13 +32,14 @@ MOST_CHARACTERS = 100
 class MissionChange:
     """One change of a mission document; ``option`` is what the user typed for it, empty for a caller's own change.
 
-    ``part``: a key of ``terrain:``, a ``limit`` (of every vehicle, or of the one that is named), a key of a
+    ``part``: the whole section ``wind:`` (whose forecast is relative to the current folder), a key of ``terrain:``, a
+    ``limit`` (of every vehicle, or of the one that is named), a key of a
     ``vehicle``, one more ``zone``, or a file whose ``zones`` count in place of ``no_fly``. A ``value`` of a zone is its
     entry; files in it are relative to the current folder.
     """
 
     option: str
-    part: Literal["terrain", "limit", "vehicle", "zone", "zones"]
+    part: Literal["wind", "terrain", "limit", "vehicle", "zone", "zones"]
     key: str
     value: Any
     vehicle: str | None = None
@@ -62,6 +63,8 @@ def changed(raw: Mapping[str, Any], changes: Sequence[MissionChange], folder: Pa
     made = _Changes(copy.deepcopy(dict(raw)), folder)
     for change in changes:
         match change.part:
+            case "wind":
+                made.wind(change)
             case "terrain":
                 made.put(made.raw.get("terrain"), "terrain", change)
             case "limit":
@@ -91,7 +94,7 @@ class _Changes:
             was = {change.key: section[change.key]}
         section[change.key] = change.value
         before = _shown(next(iter(was.values()))) if was else ""
-        place, now = f"{where}.{change.key}", _shown(change.value)
+        place, now = f"{where}.{change.key}".lstrip("."), _shown(change.value)
         if not change.option:
             return
         self.options[place] = change.option
@@ -101,6 +104,13 @@ class _Changes:
             if was
             else Note("change_adds_key", option=change.option, key_path=place, now=now)
         )
+
+    def wind(self, change: MissionChange) -> None:
+        """Let other winds count in place of the mission's own."""
+        keys = dict(change.value)
+        if "forecast" in keys:
+            keys["forecast"] = _beside(self.folder, keys["forecast"])
+        self.put(self.raw, "", replace(change, value=keys))
 
     def limit(self, change: MissionChange) -> None:
         """Set a limit for all vehicles, also for each that has its own, or for the named one alone."""

@@ -1,4 +1,4 @@
-"""What stays in memory between two readings of one mission whose keys change: open terrain, a surface, zones of files.
+"""What stays in memory between two readings of one mission whose keys change: terrain, surfaces, a forecast, zones.
 
 Each is kept for the reading that comes next, under all that it was made of, so that a changed mission is read as if
 anew, and memory does not grow with the number of changes. Files are not looked at again: what a living session plans
@@ -9,13 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from gcsplan.errors import Mistake
 from gcsplan.mission_file.zones.draft import ZoneDraft
 from gcsplan.notes.note import Note
 from gcsplan.world.geometry.surface import Surface
 from gcsplan.world.terrain.terrain import OpenTerrain
+
+if TYPE_CHECKING:
+    from gcsplan.mission_file.winds.forecast import Forecast
 
 MOST_SURFACES = 4
 """Most windows of terrain that are kept: one plan widens its window a few times."""
@@ -52,6 +55,7 @@ class KeptWorld:
     """The memory of one session; for one thread at a time."""
 
     terrain: Latest[OpenTerrain] = field(default_factory=lambda: Latest(1))
+    forecast: Latest[Forecast] = field(default_factory=lambda: Latest(1))
     surfaces: Latest[Surface] = field(default_factory=lambda: Latest(MOST_SURFACES))
     _before: dict[str, tuple[Any, ReadZones]] = field(default_factory=dict)
     _now: dict[str, tuple[Any, ReadZones]] = field(default_factory=dict)

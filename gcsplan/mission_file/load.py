@@ -18,7 +18,7 @@ from gcsplan.errors import InputError, Mistake, heed_cancel
 from gcsplan.mavlink.mission.mission import AltitudeFrame
 from gcsplan.mission_file.changes import MissionChange, changed
 from gcsplan.mission_file.kept import KeptWorld, ReadZones
-from gcsplan.mission_file.published.times import Hours, hours_of, texts_of
+from gcsplan.mission_file.published.times import Hours, begins_with_day, hours_of, texts_of
 from gcsplan.mission_file.published.unused import (
     faults_near,
     left_out_by_hours,
@@ -35,6 +35,7 @@ from gcsplan.mission_file.request import (
     VehicleRequest,
 )
 from gcsplan.mission_file.scene import (
+    MissionPlace,
     covered,
     make_box,
     make_frame,
@@ -61,6 +62,7 @@ from gcsplan.mission_file.values.schema import (
     PlannerKeys,
     TerrainKeys,
     VehicleKeys,
+    WindKeys,
     ZoneKeys,
     nearest,
     shown,
@@ -75,6 +77,7 @@ from gcsplan.mission_file.vehicles import (
     within_vel_max,
 )
 from gcsplan.mission_file.window import GroundWindow, MissionPlane, known_in_plane, opened
+from gcsplan.mission_file.winds.declaration import NEEDS_DEPARTURE, go_together, winds_of, winds_of_forecast
 from gcsplan.mission_file.zones.draft import (
     ZoneDraft,
     looks_swapped,
@@ -86,6 +89,8 @@ from gcsplan.mission_file.zones.draft import (
 )
 from gcsplan.mission_file.zones.keep_in import apart, as_keep_in, place_keep_in
 from gcsplan.notes.note import Note
+from gcsplan.wind.declared import STILL_AIR, DeclaredWind
+from gcsplan.wind.wording import wind_note
 from gcsplan.world.geodesy.frame import Frame
 from gcsplan.world.geometry.zones import KeepIn
 from gcsplan.world.terrain.model_words import notes_on
@@ -256,7 +261,9 @@ class _MissionReading:
                 areas = self._areas(inside, frame)
                 site = MissionPlane(here, frame, box, placed, areas, terminals, set(places), self.local, self.kept)
                 ground = site.load(problems)
-        if problems or frame is None or site is None or ground is None:
+        departure = self.content.departure or (None if hours is None else hours.start)
+        wind = self._wind(hours, frame, places)
+        if problems or frame is None or site is None or ground is None or wind is None:
             raise self._refusal(problems)
         info = ground.surface.info
         self.notes += notes_on(info)
@@ -268,7 +275,7 @@ class _MissionReading:
             altitude_frame=altitude_frame, terrain_error_m=terrain_error_m, local=self.local, inputs=inputs,
             notes=tuple(dict.fromkeys(self.notes)), way_home=way_home, geoid=site.terrain.geoid,
             hours=hours if left_out_by_hours(published) else None,
-            reaching=partial(_reaching, self.content), content=self.content,
+            reaching=partial(_reaching, self.content), content=self.content, wind=wind, departure=departure,
         )  # fmt: skip
         _log.info("%s: %d vehicles, %d zones", self.content.where, len(source.vehicles), len(source.zones))
         return replace(source, wider=partial(site.wider, source), at_level=partial(site.at_level, source))
@@ -406,6 +413,49 @@ class _MissionReading:
     def _hours(self) -> Hours | None:
         given, content = self.raw.get("at"), self.content
         return hours_of(given, content.departure, f"{self.where}at", self.problems, instead=content.at)
+
+    def _wind(self, hours: Hours | None, frame: Frame | None, places: Sequence[MissionPlace]) -> DeclaredWind | None:
+        """The declared winds, still air if there are none; None if they have mistakes."""
+        if self.raw.get("wind") is None:
+            return STILL_AIR
+        before = len(self.problems)
+        keys: WindKeys | None = self._section(WindKeys, "wind")
+        where = f"{self.where}wind"
+        if keys is None or len(self.problems) > before or not go_together(keys, where, self.problems):
+            return None
+        if keys.forecast is None:
+            wind = winds_of(keys, where, self.problems)
+        else:
+            wind = self._forecast(keys, hours, frame, places)
+        if wind is not None and not wind.still:
+            self.notes += [wind_note(wind), Note("wind_not_counted")]
+        return wind
+
+    def _forecast(
+        self, keys: WindKeys, hours: Hours | None, frame: Frame | None, places: Sequence[MissionPlace]
+    ) -> DeclaredWind | None:
+        """The winds of a forecast; None if it has mistakes, or its hours or places have."""
+        at, departure = self.content.at or self.raw.get("at"), self.content.departure
+        if hours is None and at is not None:
+            return None
+        if hours is None or (departure is None and begins_with_day(at)):
+            self.problems.append(Mistake(f"{self.where}wind.forecast", NEEDS_DEPARTURE))
+            return None
+        if frame is None:
+            return None
+        if departure is not None:
+            common = Hours.around(departure)
+            hours = Hours(min(hours.start, common.start), max(hours.end, common.end))
+        from gcsplan.mission_file.winds.forecast import read_forecast  # imported here: most missions name no forecast
+
+        path = self.file.parent / str(keys.forecast)
+        read = partial(self.kept.forecast.get, path, partial(read_forecast, path, f"{self.where}wind.forecast"))
+        in_plane = [place.in_plane(frame) for place in places]
+        made = winds_of_forecast(keys, read, hours, frame, in_plane, f"{self.where}wind", self.problems)
+        if made is None:
+            return None
+        self.notes.append(made[1])
+        return made[0]
 
     def _zones(self, hours: Hours | None) -> tuple[list[ZoneDraft], list[ZoneDraft]]:
         """The no-fly zones, and the areas to stay in. A file of ``no_fly`` may have areas, too: a world with holes."""

@@ -103,6 +103,7 @@ def text_of(draft: Draft, file: str, name: str) -> str:
     parts.append("")
     for key, value in (("altitude_frame", "relative"), ("way_home", "reported")):
         parts += _key(MissionKeys, key, value, "")
+    parts += _key(MissionKeys, "wind", "{up_to_m_s: 5}", "", made=False)
     return "\n".join(part.rstrip("\n") if part else part for part in parts) + "\n"
 
 

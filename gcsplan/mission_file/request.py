@@ -13,6 +13,7 @@ from gcsplan.mavlink.mission.return_parameters import ReturnRoute
 from gcsplan.mission_file.published.times import Hours
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import MissionEnd, Vehicle
+from gcsplan.wind.declared import STILL_AIR, DeclaredWind
 from gcsplan.world.geodesy.frame import Frame
 from gcsplan.world.geometry.surface import Surface
 from gcsplan.world.geometry.zones import Zone
@@ -120,7 +121,8 @@ class MissionFile:
     too. ``at_level(level)`` is the file over the terrain of that level; None if there is none. ``content`` is what
     it was read from. ``way_home``: whether a safe return is required, or only reported where it is judged. ``geoid`` is
     the grid that the terrain was converted with, if it is ellipsoidal. ``hours`` are those of the flight, if a zone was
-    left out because it does not apply in them.
+    left out because it does not apply in them. ``wind``: the winds that may blow; `STILL_AIR` if none is declared.
+    ``departure``: the mission's T+0, if it says when it is flown: the common start, or the beginning of ``at``.
     """
 
     name: str
@@ -146,6 +148,8 @@ class MissionFile:
     hours: Hours | None = None
     at_level: Callable[[int], MissionFile | None] | None = None
     content: Content | None = None
+    wind: DeclaredWind = STILL_AIR
+    departure: datetime | None = None
 
     @property
     def changes(self) -> tuple[Note, ...]:

@@ -63,6 +63,22 @@ INPUT_TEXTS = {
     "position_of_armed_vehicle": "the vehicle is armed: its position may not be on the ground",
     "parameters_not_read": "no parameters could be read: the return altitude is left open",
     "ground_is_flat": "the ground is flat at {flat_m:height} above sea level in this mission: no hill is seen",
+    # -- the declared wind --
+    "still_air": "still air: times, energies and paths count no wind",
+    "wind_declared": "declared wind: {speeds} from {directions}; {blows}{gusts}",
+    "wind_speed": "{most_m_s:speed.1}",
+    "wind_speeds": "{least_m_s:speed.1 bare} to {most_m_s:speed.1}",
+    "wind_from": "{from_deg:.0f}°",
+    "wind_from_range": "{from_deg:.0f}° to {to_deg:.0f}°",
+    "wind_from_any": "any direction",
+    "wind_is_one": "one wind during the whole flight",
+    "wind_varies": "another one at each place and time",
+    "wind_gusts": "; gusts up to {gust_m_s:speed.1}",
+    "wind_not_counted": "times, energies and paths of this version are for still air: the declared wind is not counted",
+    "wind_of_forecast": (
+        "wind by the forecast {file} for {lat_deg:.4f}, {lon_deg:.4f}, at most {away_m:reach} from the mission's "
+        "places, {hours}"
+    ),
     # -- a file that is checked: its home, its fence, and the hours for which it is judged --
     "home_row_blank": "the file's home row is blank: the vehicle's start in the mission file was taken for home",
     "home_row_elsewhere": (

@@ -49,7 +49,6 @@ MARK_KINDS = ("start", "goal", "rally", "name")
 """The marks of the map that are on the briefing's, too."""
 MOST_PARAMETERS, MOST_WAY_POINTS = 30, 24
 """Most parameters, and most way points of all vehicles together, on the second page."""
-STILL_AIR = "still air: times, energies and paths count no wind"
 NOT_IN_IT = "Wind, emergency landing sites and moving obstacles are not in the model."
 
 
@@ -72,7 +71,7 @@ def briefing_html(page: Page, verdict: tuple[str, str, str, str], relief: Relief
         + "".join(f'<p class="fact">{text}</p>' for text in (more, _rally(page, shown), apart, _order(page)) if text)
         + f'<p class="fact"><b>{bare}</b>{NOT_IN_IT} {_inputs(page)}</p>{_signatures()}</section>'
         + f'<section class="briefing" id="briefing-2"><p class="brand">mission briefing, second page</p>'
-        f'<p class="fact">Wind: {STILL_AIR}. {_daylight(page)}</p>'
+        f'<p class="fact">Wind: {esc(in_units(page.wind, page.units))}. {_daylight(page)}</p>'
         f"{_parameters(shown)}{_way_points(page, shown)}</section>"
     )
 

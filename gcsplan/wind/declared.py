@@ -110,6 +110,10 @@ class DeclaredWind:
         return at
 
 
+STILL_AIR = DeclaredWind(np.zeros((1, 1, 2)), np.zeros((1, 1, 2)))
+"""The wind of a mission that declares none."""
+
+
 def _between(nodes: Floats, x: Floats) -> tuple[np.ndarray, np.ndarray, Floats]:
     """The nodes below and above each of ``x``, and its part of the way between them; the ends count beyond them."""
     above = np.clip(np.searchsorted(nodes, x, side="right"), 1, max(len(nodes) - 1, 1))

@@ -26,6 +26,8 @@ from gcsplan.cli.command_table import app
 from gcsplan.errors import Cancelled, GcsplanError, InputError, UsageError
 from tests.export.test_output_schema import FLAT
 from tests.mission_file.test_memory_files import FEATURE, TERRAIN
+from tests.support.batches import mission
+from tests.support.forecasts import forecast
 
 LEGS: dict[str, Any] = {
     **FLAT,
@@ -318,6 +320,23 @@ def test_zones_of_objects_never_take_each_others_places() -> None:
     assert names() == ["b", "c", "e"]
     session.change({"no_fly[0]": feature("f", 0.005)})
     assert names() == ["f", "c", "e"]
+
+
+def test_a_forecast_counts_as_it_was_read_until_the_session_reloads(tmp_path: Path) -> None:
+    def gusts(kmh: float) -> Path:
+        file = tmp_path / "wind.json"
+        file.write_text(json.dumps(forecast(hourly__wind_gusts_10m=[kmh] * 6)), encoding="utf-8")
+        return file
+
+    session = Planner({
+        **yaml.safe_load(mission()), "at": "2026-11-28T10:00Z", "wind": {"forecast": str(gusts(72.0))},
+    })  # fmt: skip
+    before = session.plan().source.wind.gust_m_s
+    gusts(90.0)
+    session.change({"limits.min_agl_m": 31})
+    assert session.plan().source.wind.gust_m_s == before
+    session.reload()
+    assert session.plan().source.wind.gust_m_s == pytest.approx((before or 0.0) + 5.0)
 
 
 def test_a_session_plans_over_what_it_read_until_it_reloads(tmp_path: Path) -> None:

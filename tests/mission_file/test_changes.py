@@ -72,6 +72,7 @@ def drawn_changes(rng: random.Random) -> list[MissionChange]:
         MissionChange("--start", "vehicle", "start", "32T 424000 5205600", name),
         MissionChange("--via", "vehicle", "via", [place(0.004) for _ in range(rng.randint(0, 2))], name),
         MissionChange("--speed", "vehicle", "speed_m_s", rng.choice([8, [4, 9.5]]), name),
+        MissionChange("--wind", "wind", "wind", {"speed_m_s": [3, 5], "from_deg": rng.choice([270, [350, 20]])}),
     ]
     return rng.sample(every, rng.randint(1, 4))
 
@@ -123,6 +124,14 @@ def test_a_saved_file_keeps_every_comment_and_all_lines_that_did_not_change(tmp_
     again = load_mission(file)
     assert [v.vehicle.limits.max_agl_m for v in again.vehicles] == [90.0]
     assert "avoid 1" in [zone.name for zone in again.zones]
+
+
+def test_another_wind_replaces_the_section_and_names_its_file_from_the_mission(tmp_path: Path) -> None:
+    raw = {"wind": {"speed_kt": 9, "from_deg": 3}}
+    change = MissionChange("--wind a.json", "wind", "wind", {"forecast": str(tmp_path / "a.json")})
+    made = changed(raw, [change], tmp_path / "missions")
+    assert made.raw == {"wind": {"forecast": "../a.json"}}
+    assert made.options == (("wind", "--wind a.json"),)
 
 
 def test_a_limit_of_all_counts_for_a_vehicle_with_its_own() -> None:

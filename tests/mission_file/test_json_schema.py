@@ -87,6 +87,9 @@ TAKEN = [
     ("terrain.obstacle_height_m", 3),
     ("altitude_frame", "amsl"),
     ("name", "Ridge"),
+    ("wind", None),
+    ("wind", {"speed_kt": "10 ± 3", "from_deg": [350, 20], "gust_m_s": 12}),
+    ("wind", {"levels": [{"agl_ft": 30, "speed_kmh": [9, 20], "from_deg": "270 ± 20"}], "varying": True}),
 ]
 
 
@@ -128,6 +131,9 @@ def test_local_metres_in_feet_fit(judge: Draft202012Validator) -> None:
         ("no_fly.0.radius", 400),
         ("planner.name", "optimum"),
         ("arrival.mode", "all"),
+        ("wind", {"speed_m_s": 76, "from_deg": 0}),
+        ("wind", {"up_to_m_s": [1, 2]}),
+        ("wind", {"levels": [{"agl_m": 30, "speed_m_s": 3}]}),
         ("terrain", None),
     ],
 )

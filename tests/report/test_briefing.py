@@ -8,6 +8,7 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from gcsplan.check.returns.verdict import RallyPoint
@@ -16,6 +17,8 @@ from gcsplan.notes.note import Note
 from gcsplan.report.page import render_page
 from gcsplan.report.parts import html as markup
 from gcsplan.report.parts.page_data import Page, Rehearsed
+from gcsplan.wind.declared import DeclaredWind
+from gcsplan.wind.wording import wind_note
 from gcsplan.world.geodesy.daylight import daylight
 from tests.support import browser as chromium
 from tests.support.noted import saying
@@ -135,6 +138,10 @@ def test_the_second_page_has_way_points_parameters_and_failsafes() -> None:
     text = briefing(page)
     assert "still air: times, energies and paths count no wind" in text
     assert "Way points of uav1" in text
+    west = wind_note(DeclaredWind(np.full((1, 1, 2), 5.0), np.full((1, 1, 2), 270.0)))
+    windy = briefing(replace(page, notes=(*page.notes, west)))
+    assert "Wind: declared wind: 5.0 m/s from 270°; one wind during the whole flight. " in windy
+    assert "still air" not in windy
     for leg in page.subjects[0].verdict.legs:
         assert " ".join(markup.num(leg.end[2], 0, page.units.amsl).split()) in text
     assert "Daylight is not known" in text

@@ -54,6 +54,14 @@ SpeedOption = Annotated[
     list[str] | None,
     typer.Option("--speed", metavar="[NAME=]M_S|MIN-MAX", help="Cruise speed, of all vehicles or of one, in m/s."),
 ]
+WindOption = Annotated[
+    str | None,
+    typer.Option(
+        "--wind", metavar="WIND",
+        help="Winds in place of the mission's `wind`: M_S,FROM_DEG[,GUST] (5,270,9; ranges: 3-7,250-290), "
+        "up-to:M_S[,GUST] (any direction), a forecast (FILE.json), or still.",
+    ),
+]  # fmt: skip
 SaveOption = Annotated[
     bool,
     typer.Option(
@@ -70,7 +78,7 @@ _NAMED = re.compile(r"([A-Za-z0-9_-]{1,64})=(.*)", re.DOTALL)
 def changes_of(
     avoid: Sequence[str] | None, avoid_file: Sequence[str] | None, zones: Sequence[str] | None,
     limits: dict[str, Sequence[str] | None], places: dict[str, Sequence[str] | None], via: Sequence[str] | None,
-    speed: Sequence[str] | None, terrain: dict[str, object],
+    speed: Sequence[str] | None, terrain: dict[str, object], wind: str | None = None,
 ) -> list[MissionChange]:  # fmt: skip
     """The changes, in the order in which they are made. ``limits``, ``places``: by their keys in the mission file.
 
@@ -98,7 +106,29 @@ def changes_of(
     for name, texts in points.items():
         given = [] if texts == ["none"] else [_via(text) for text in texts]
         made.append(MissionChange(f"--via {texts[0]}", "vehicle", "via", given, name))
-    return made
+    return [*made, *wind_changes(wind)]
+
+
+def wind_changes(text: str | None) -> list[MissionChange]:
+    """The change of a ``--wind``; none without it. Raises UsageError with what it takes."""
+    from gcsplan.mission_file.changes import MissionChange
+
+    return [] if text is None else [MissionChange(f"--wind {text}", "wind", "wind", _wind(text.strip()))]
+
+
+def _wind(text: str) -> dict[str, Any]:
+    """The section ``wind:`` of a mission."""
+    if text == "still":
+        return {"up_to_m_s": 0}
+    if text.lower().endswith(".json"):
+        return {"forecast": text}
+    most = text.removeprefix("up-to:")
+    parts = [part.strip() for part in most.split(",")]
+    form = ["up_to_m_s", "gust_m_s"] if most != text else ["speed_m_s", "from_deg", "gust_m_s"]
+    if not len(form) - 1 <= len(parts) <= len(form):
+        raise UsageError(f"--wind {text}: give M_S,FROM_DEG or M_S,FROM_DEG,GUST (5,270,9), up-to:M_S, still, or a "
+                         "forecast FILE.json")  # fmt: skip
+    return {key: _one_or_range("--wind", part) for key, part in zip(form, parts, strict=False)}
 
 
 def _named(texts: Sequence[str] | None) -> list[tuple[str | None, str]]:
@@ -158,11 +188,19 @@ def _via(text: str) -> Any:
 
 def _speeds(text: str) -> Any:
     """One speed, or [slowest, fastest]."""
+    given = _one_or_range("--speed", text)
+    if isinstance(given, list) and given[0] > given[1]:
+        raise UsageError(f"--speed {text}: give one speed, or the slowest and the fastest: 3-15")
+    return given
+
+
+def _one_or_range(option: str, text: str) -> Any:
+    """A number, or [from, to] of ``FROM-TO``."""
     band = _BAND.fullmatch(text.strip())
     if band is None:
-        return _number("--speed", text)
-    if band[1] is None or band[2] is None or float(band[1]) > float(band[2]):
-        raise UsageError(f"--speed {text}: give one speed, or the slowest and the fastest: 3-15")
+        return _number(option, text)
+    if band[1] is None or band[2] is None:
+        raise UsageError(f"{option} {text}: give one number, or FROM-TO, such as 3-15")
     return [_plain(float(band[1])), _plain(float(band[2]))]
 
 

@@ -21,6 +21,7 @@ from gcsplan.cli.arguments.changes import (
     SpeedOption,
     StartOption,
     ViaOption,
+    WindOption,
     ZonesInsteadOption,
     changes_of,
 )
@@ -109,6 +110,7 @@ def plan(
     goal: GoalOption = None,
     via: ViaOption = None,
     speed: SpeedOption = None,
+    wind: WindOption = None,
     save: SaveOption = False,
     seed: SeedOption = None,
     encoding: EncodingOption = None,
@@ -216,7 +218,7 @@ def plan(
     directory = Path(file_of(mission).stem) if out is None else out
     changes = changes_of(
         avoid, avoid_file, zones, {"max_agl_m": max_agl, "min_agl_m": min_agl}, {"start": start, "goal": goal}, via,
-        speed, terrain_keys(vertical_datum, height_unit, nodata),
+        speed, terrain_keys(vertical_datum, height_unit, nodata), wind,
     )  # fmt: skip
     gate = None if gate_utc is None else GateTime.parse(gate_utc, datetime.now(UTC))
     each = _require_options(planner, objective, png, directory)

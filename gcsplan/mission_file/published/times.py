@@ -67,6 +67,11 @@ class Hours:
         return cls(departure - EARLIEST_LIFT_OFF, departure + ALONE)
 
 
+def begins_with_day(given: Any) -> bool:
+    """Whether an ``at`` that can be read begins with a day, without a time of day."""
+    return _DATE.fullmatch(str(given[0] if isinstance(given, list | tuple) else given).strip()) is not None
+
+
 def texts_of(at: str | Sequence[str] | None) -> tuple[str, ...] | None:
     """The texts of an ``at`` that is given beside a mission: one, or from and to; ``FROM/TO`` is both."""
     if at is None:

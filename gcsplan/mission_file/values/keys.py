@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -11,6 +12,14 @@ LARGEST_KEY_M = 1e6
 
 FiniteMetres = Annotated[float, Field(ge=-LARGEST_KEY_M, le=LARGEST_KEY_M)]
 Length = Annotated[float, Field(ge=0.0, le=LARGEST_KEY_M)]
+
+_WITH_ERROR = re.compile(r"\s*(\d{1,9}(?:\.\d{1,9})?)\s*(?:±|\+/?-)\s*(\d{1,9}(?:\.\d{1,9})?)\s*", re.ASCII)
+
+
+def with_error(value: Any) -> tuple[float, float] | None:
+    """The number and its error of a text such as ``5 ± 2`` (or ``5 +- 2``); None for anything else."""
+    found = _WITH_ERROR.fullmatch(value) if isinstance(value, str) else None
+    return None if found is None else (float(found[1]), float(found[2]))
 
 
 class Keys(BaseModel):

@@ -18,9 +18,10 @@ from pydantic import (
     Discriminator,
     Field,
     Tag,
+    WithJsonSchema,
 )
 
-from gcsplan.mission_file.values.keys import LARGEST_KEY_M, FiniteMetres, Keys, Length
+from gcsplan.mission_file.values.keys import LARGEST_KEY_M, FiniteMetres, Keys, Length, with_error
 from gcsplan.mission_file.values.point_keys import POINT_FORMS, LatLon, Point, ViaPoint, in_own_brackets
 
 NAME_PATTERN = r"^[A-Za-z0-9_-]+$"
@@ -30,6 +31,9 @@ LEAST_POSITIVE = 1e-3
 
 
 MOST_VOLTS = 10_000.0
+
+MOST_DECLARED_M_S = 75.0
+"""Fastest wind that a mission may declare: faster than any gust in which an aircraft of these kinds has flown."""
 
 
 def _no_trifle(value: float) -> float:
@@ -66,6 +70,58 @@ else:
         | Annotated[list[Speed], Field(min_length=2, max_length=2), Tag("several")],
         Discriminator(_count),
     ]
+
+
+def _speeds_with_error(value: Any) -> Any:
+    """A text such as ``5 ± 2`` as the range of its speeds, which begins at 0 at the lowest."""
+    parts = with_error(value)
+    return value if parts is None else [max(parts[0] - parts[1], 0.0), parts[0] + parts[1]]
+
+
+def _directions_with_error(value: Any) -> Any:
+    """A text such as ``270 ± 20`` as the range of its directions; an error of 180 and more is any direction."""
+    parts = with_error(value)
+    if parts is None or parts[0] > 360.0:
+        return value
+    return [0.0, 360.0] if parts[1] >= 180.0 else [(parts[0] - parts[1]) % 360.0, (parts[0] + parts[1]) % 360.0]
+
+
+def _rising(speeds_m_s: list[float]) -> list[float]:
+    if speeds_m_s[0] > speeds_m_s[1]:
+        raise ValueError(f"must be [lowest, highest], given [{speeds_m_s[0]:g}, {speeds_m_s[1]:g}]")
+    return speeds_m_s
+
+
+def _clockwise(from_deg: list[float]) -> list[float]:
+    """A range whose end is above its beginning: one that crosses north ends above 360."""
+    return [from_deg[0], from_deg[1] + 360.0 * (from_deg[1] < from_deg[0])]
+
+
+def _number_range_or_text(most: float, example: str) -> WithJsonSchema:
+    number = {"type": "number", "minimum": 0.0, "maximum": most}
+    pair = {"type": "array", "items": number, "minItems": 2, "maxItems": 2}
+    return WithJsonSchema({"anyOf": [number, pair, {"type": "string", "examples": [example]}]})
+
+
+if TYPE_CHECKING:  # one number becomes two
+    WindSpeeds = list[float]
+    WindDirections = list[float]
+else:
+    _WindSpeed = Annotated[float, Field(ge=0.0, le=MOST_DECLARED_M_S)]
+    _Bearing = Annotated[float, Field(ge=0.0, le=360.0)]
+
+    def _one_or_range(kind: Any) -> Any:
+        one = Annotated[kind, AfterValidator(_same), Tag("one")]
+        return one | Annotated[list[kind], Field(min_length=2, max_length=2), Tag("several")]
+
+    WindSpeeds = Annotated[
+        Annotated[_one_or_range(_WindSpeed), Discriminator(_count)],
+        BeforeValidator(_speeds_with_error), AfterValidator(_rising), _number_range_or_text(MOST_DECLARED_M_S, "5 ± 2"),
+    ]  # fmt: skip
+    WindDirections = Annotated[
+        Annotated[_one_or_range(_Bearing), Discriminator(_count)],
+        BeforeValidator(_directions_with_error), AfterValidator(_clockwise), _number_range_or_text(360.0, "270 ± 20"),
+    ]  # fmt: skip
 POINT_FORM_NAMES = ("[lat, lon]", "text", *POINT_FORMS, "one", "several")
 """The tags of unions, which are no part of a key's place."""
 
@@ -317,6 +373,42 @@ def _plain_values(parameters: dict[str, Any]) -> dict[str, Any]:
     return parameters
 
 
+class WindLevelKeys(Keys):
+    """One entry of ``levels:`` of ``wind:``."""
+
+    agl_m: Length | None = None
+    """Height above ground."""
+    amsl_m: FiniteMetres | None = None
+    """Altitude above sea level, in place of `agl_m`; all levels count from the same."""
+    speed_m_s: WindSpeeds
+    """Speed at this height, or [lowest, highest], or `5 ± 2`."""
+    from_deg: WindDirections
+    """Direction it comes from at this height, or a range clockwise, or `270 ± 20`."""
+
+
+class WindKeys(Keys):
+    """``wind:``: one of `speed_m_s`, `up_to_m_s`, `levels` and `forecast`. Without it the air is still."""
+
+    speed_m_s: WindSpeeds | None = None
+    """Speed of the wind, at every height; a range [lowest, highest], also as `5 ± 2`, is one unknown wind in it."""
+    from_deg: WindDirections | None = None
+    """Direction it comes from, clockwise from true north; or a range clockwise ([350, 20]), also as `270 ± 20`."""
+    up_to_m_s: Annotated[float, Field(ge=0.0, le=MOST_DECLARED_M_S)] | None = None
+    """One unknown wind of at most this speed, from any direction."""
+    levels: Annotated[list[WindLevelKeys], Field(min_length=1, max_length=100)] | None = None
+    """The wind by height, upwards: linear between two levels, and as the nearest level below and above all."""
+    forecast: Text | None = None
+    """A file as Open-Meteo's forecast API returns it (JSON, hourly wind); `at` must say when the flight begins."""
+    speed_error_m_s: Annotated[float, Field(ge=0.0, le=MOST_DECLARED_M_S)] | None = None
+    """With `forecast`: how much faster or slower the wind may be; if absent, 0."""
+    from_error_deg: Annotated[float, Field(ge=0.0, le=180.0)] | None = None
+    """With `forecast`: how far to either side of the forecast's direction it may come from; if absent, 0."""
+    gust_m_s: Annotated[float, Field(ge=0.0, le=MOST_DECLARED_M_S)] | None = None
+    """Highest speed in a gust, at least that of the wind; if absent, no gusts, or a forecast's own."""
+    varying: bool = False
+    """Whether the wind may be any of these at each place and time, instead of one during the whole flight."""
+
+
 class PlannerKeys(Keys):
     """``planner:``; the keys below ``budget_mb`` belong to planners that search with a swarm."""
 
@@ -367,6 +459,8 @@ class MissionKeys(Keys):
     """Areas, from floor to ceiling, whose union every flight stays in with all its errors."""
     at: Text | Annotated[list[Text], Field(min_length=2, max_length=2)] | None = None
     """When it is flown: a time, a day, or [from, to]; published zones that do not apply then are left out."""
+    wind: WindKeys | None = None
+    """The winds that may blow during the flight; if absent, still air."""
     vehicles: Annotated[list[VehicleKeys], Field(min_length=1, max_length=255)]
     """The vehicles, with their starts and goals."""
     arrival: ArrivalKeys | None = None

@@ -15,7 +15,7 @@ from functools import cache
 from typing import Any, NamedTuple, TypeGuard, get_args
 
 from gcsplan.errors import Mistake
-from gcsplan.mission_file.values.keys import Keys
+from gcsplan.mission_file.values.keys import Keys, with_error
 from gcsplan.mission_file.values.schema import MOST_VOLTS, MissionKeys, shown
 from gcsplan.notes.note import Note
 from gcsplan.units import FOOT, KM_PER_HOUR, KNOT, MILLIAMPERE_HOUR, MINUTE, NAUTICAL_MILE, WATT_HOUR, Unit
@@ -249,9 +249,11 @@ def _is_number(value: Any) -> TypeGuard[float]:
 
 
 def _times(value: Any, size: float) -> Any:
-    """A number, or each number of a list, times ``size``; anything else is itself, and refused by the reader."""
+    """A number, each number of a list, or a number with its error, times ``size``; the reader refuses anything else."""
     if _is_number(value):
         return float(value) * size
+    if (parts := with_error(value)) is not None:
+        return " ± ".join(f"{part * size:.9f}" for part in parts)
     if isinstance(value, list) and value and all(map(_is_number, value)):
         return [float(v) * size for v in value]
     return value
@@ -260,4 +262,6 @@ def _times(value: Any, size: float) -> Any:
 def _figures(value: Any) -> str:
     if isinstance(value, list):
         return f"[{', '.join(map(_figures, value))}]"
+    if isinstance(value, str):
+        return " ± ".join(map(_figures, with_error(value) or ())) or value
     return f"{value:.10g}" if math.isfinite(value) else str(value)

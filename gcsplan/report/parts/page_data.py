@@ -140,6 +140,11 @@ class Page:
     daylight: Daylight | None = None
 
     @property
+    def wind(self) -> Note:
+        """The note on the winds that the mission declares, or that the air is still."""
+        return next((note for note in self.notes if note.code == "wind_declared"), Note("still_air"))
+
+    @property
     def time_decimals(self) -> int:
         """Decimals of the arrivals: tenths in a fleet, whose order may hang on them."""
         return 1 if sum(s.slot is not None for s in self.subjects) > 1 else 0

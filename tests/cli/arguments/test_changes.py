@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from gcsplan.cli.arguments.changes import changes_of
+from gcsplan.cli.arguments.changes import changes_of, wind_changes
 from gcsplan.errors import UsageError
 from tests.support.batches import mission
 
@@ -64,6 +64,42 @@ def test_values_may_be_for_one_vehicle() -> None:
 def test_a_wrong_text_is_refused_with_its_cure(option: str, text: str, words: str) -> None:
     with pytest.raises(UsageError, match=words):
         given(**{option: [text]})
+
+
+@pytest.mark.parametrize(
+    ("text", "section"),
+    [
+        ("5,270", {"speed_m_s": 5, "from_deg": 270}),
+        ("5, 270, 9.5", {"speed_m_s": 5, "from_deg": 270, "gust_m_s": 9.5}),
+        ("3-7,350-20", {"speed_m_s": [3, 7], "from_deg": [350, 20]}),
+        ("up-to:8", {"up_to_m_s": 8}),
+        ("up-to:8,12", {"up_to_m_s": 8, "gust_m_s": 12}),
+        ("still", {"up_to_m_s": 0}),
+        ("winds/today.JSON", {"forecast": "winds/today.JSON"}),
+    ],
+)
+def test_a_wind_is_the_section_of_a_mission(text: str, section: dict[str, Any]) -> None:
+    assert [(c.part, c.key, c.value) for c in wind_changes(text)] == [("wind", "wind", section)]
+
+
+@pytest.mark.parametrize("text", ["5", "", "north", "5,270,9,1", "up-to:", "up-to:1,2,3", "-5,270", "5,nan", "3-,270"])
+def test_a_text_that_is_no_wind_is_refused_with_the_forms(text: str) -> None:
+    with pytest.raises(UsageError, match=r"--wind .*: give"):
+        wind_changes(text)
+
+
+def test_a_wind_of_a_run_is_named_and_saved_in_place_of_the_files(run: Any, tmp_path: Path) -> None:
+    file = tmp_path / "field.yaml"
+    file.write_text(mission() + "wind: {up_to_m_s: 3, varying: true}  # calm\n")
+    code, out, _ = run("plan", file, "--wind", "5,270", "--json")
+    assert (code, json.loads(out)["changes"]) == (
+        0,
+        ["--wind 5,270: wind is {speed_m_s: 5, from_deg: 270} in place of {up_to_m_s: 3, varying: true}"],
+    )
+    assert "up_to_m_s: 3" in file.read_text()
+    assert run("plan", file, "--wind", "5,270", "--save")[0] == 0
+    assert "from_deg: 270}  # calm\n" in file.read_text()
+    assert "up_to_m_s" not in file.read_text()
 
 
 def test_an_option_that_counts_once_is_refused_twice() -> None:
