@@ -251,14 +251,21 @@ def _changed(content: Content, changes: Mapping[str, object]) -> Content:
     """The content with other values of some keys. Raises InputError, UsageError."""
     expected = "a mapping from keys to values, such as {'limits.min_agl_m': 40}"
     require_kind("change()", "changes", changes, Mapping, expected)
-    given, held = copy.deepcopy(content.given), dict(content.held)
+    given, held = dict(content.given), dict(content.held)
+    touched: set[str] = set()  # sections of which ``given`` has its own copy
     for place, value in elements("change()", "changes", changes.items(), tuple, expected):
         if not isinstance(place, str):
             raise wrong_argument("change()", "a key", place, "named by text, such as 'limits.min_agl_m'")
+        first = _STEP.match(place)
+        section = "" if first is None else str(first[1])
+        if section in given and section not in touched:
+            given[section] = copy.deepcopy(given[section])
+        touched.add(section)
         with failing(f"change(): {place[:80]}"):  # a stranger's mapping
             _put(given, place, value)
-    given = read_content(given, None, held=held)[2]  # arrays, GeoJSON and tuples as in any mapping
-    text = repr(given)
+    new = {section: given[section] for section in touched if section in given}
+    given |= read_content(new, None, held=held)[2]  # arrays, GeoJSON and tuples as in any mapping
+    text = repr(given) if held else ""
     return replace(content, given=given, held={name: data for name, data in held.items() if repr(name) in text})
 
 
