@@ -124,7 +124,7 @@ class UsageError(InputError):
     default_reason = "usage"
 
 
-PATH = (str, os.PathLike)
+PATH_KINDS = (str, os.PathLike)
 """The kinds of a path."""
 
 
@@ -136,7 +136,7 @@ def require_kind(where: str, name: str, value: object, kind: Any, expected: str)
     try:
         if fits and isinstance(value, Real):
             float(value)
-        if fits and kind == PATH:
+        if fits and kind == PATH_KINDS:
             fits = b"\0" not in os.fsencode(value)  # type: ignore[arg-type]
     except Exception:  # OverflowError, UnicodeEncodeError, and whatever a stranger's path raises
         fits = False

@@ -15,7 +15,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from gcsplan.errors import PATH, InputError, UsageError, raised, require_kind, wrong_argument
+from gcsplan.errors import PATH_KINDS, InputError, UsageError, raised, require_kind, wrong_argument
 from gcsplan.mission_file.memory_files import with_rasters, with_zones
 from gcsplan.mission_file.values.schema import nearest, shown, text_keys
 from gcsplan.mission_file.values.yaml import (
@@ -103,7 +103,7 @@ def read_content(
             raise UsageError("load_mission takes a mapping or a text, not both", where="text")
         file, where, raw = UNNAMED, "mission", _Plain(held).of(source, "mission", 0)
     elif isinstance(source, os.PathLike) or (isinstance(source, str) and source):
-        require_kind("load_mission()", "source", source, PATH, expected)
+        require_kind("load_mission()", "source", source, PATH_KINDS, expected)
         file, where = Path(source), str(source)
         if text is None:
             file = file_of(source)

@@ -16,6 +16,7 @@ from typing import cast
 
 import numpy as np
 
+from gcsplan.arrays import Floats
 from gcsplan.errors import InputError, NoMission, needs, unknown_name
 from gcsplan.planners.problem import Problem, Refusal, Solution, passes_vias
 from gcsplan.plugins import PLANNERS, failing, function_at
@@ -76,7 +77,8 @@ def _looked_at(found: object, problem: Problem, where: str) -> Solution:
     """A stranger's solution as a path alone. Raises InputError."""
     if not isinstance(found, Solution):
         raise InputError(f"a planner returns a Solution, given {type(found).__name__}", where=where)
-    points, times_s = np.empty(0), (math.nan, math.nan)
+    points: Floats = np.empty(0)
+    times_s = math.nan, math.nan
     with suppress(Exception):  # whatever a stranger's numbers raise: they are none
         times_s = float(found.planning_s), float(found.first_path_s)
         points = np.asarray(found.path.points, dtype=object).astype(np.float64)

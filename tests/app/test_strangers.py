@@ -152,7 +152,7 @@ def test_a_strange_value_of_a_key_is_refused_with_its_place(
             here = here[step]
         here[place[-1]] = value
         message = refused(lambda mission=mission: load_mission(mission))
-        assert not message or message.startswith(("mission", str(place[0]), "2 mistakes")), type(value)
+        assert not message or ": " in message, type(value)
         assert len(message) < 3000, type(value)
 
 

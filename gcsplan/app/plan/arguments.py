@@ -8,7 +8,7 @@ from numbers import Integral, Real
 from typing import Any
 
 from gcsplan.app.plan.model import Plan
-from gcsplan.errors import PATH, require_kind
+from gcsplan.errors import PATH_KINDS, require_kind
 
 __all__ = ["require"]
 
@@ -24,9 +24,9 @@ EXPECTED: dict[str, tuple[Any, str]] = {
     "jobs": (Integral, "a number of processes"),
     "leave_out": (bool, "True or False"),
     "planned": (Plan, "a plan, as gcsplan.plan returns it"),
-    "folder": (PATH, "the path of a folder"),
-    "file": (PATH, "the path of a file"),
-    "what": (PATH, "a plan, a mission, or the path of a .waypoints or .plan file"),
+    "folder": (PATH_KINDS, "the path of a folder"),
+    "file": (PATH_KINDS, "the path of a file"),
+    "what": (PATH_KINDS, "a plan, a mission, or the path of a .waypoints or .plan file"),
     "vehicle": (str, "the name of a vehicle"),
     "report": (bool, "True or False"),
     "way_home": (bool, "True or False"),
