@@ -122,8 +122,8 @@ def _first_paths(
 
 
 def _cancels(mission: dict[str, Any], count: int, rng: np.random.Generator) -> dict[str, Any]:
-    """Seconds of the processor from `cancel` to the end of a plan, at random moments of it; by the clock where the system
-    does not count a thread's."""
+    """Seconds of the processor from `cancel` to the end of a plan, at random moments of it; by the clock where no
+    thread's seconds are counted."""
     session = Planner(mission)
     counted = hasattr(time, "pthread_getcpuclockid")
     begun_s = time.perf_counter()
