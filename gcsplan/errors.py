@@ -15,10 +15,12 @@ A message states what was required, what was given, where, and what to do about 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator
+import os
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
+from numbers import Real
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
@@ -120,6 +122,59 @@ class UsageError(InputError):
     """The arguments on the command line are wrong."""
 
     default_reason = "usage"
+
+
+PATH_KINDS = (str, os.PathLike)
+"""The kinds of a path."""
+
+
+def require_kind(where: str, name: str, value: object, kind: Any, expected: str) -> None:
+    """Raise UsageError unless the argument ``name`` is of a ``kind``, which ``expected`` says in words.
+
+    True and False are no numbers, nor is one that no float holds; a path is one that the system can have."""
+    fits = isinstance(value, kind) and (kind is bool or not isinstance(value, bool))
+    try:
+        if fits and isinstance(value, Real):
+            float(value)
+        if fits and kind == PATH_KINDS:
+            fits = b"\0" not in os.fsencode(value)  # type: ignore[arg-type]
+    except Exception:  # OverflowError, UnicodeEncodeError, and whatever a stranger's path raises
+        fits = False
+    if not fits:
+        raise wrong_argument(where, name, value, expected)
+
+
+def elements(where: str, name: str, value: Any, kind: Any, expected: str) -> tuple[Any, ...]:
+    """The elements of an argument that is a sequence of a ``kind``. Raises UsageError."""
+    try:
+        found = None if isinstance(value, str | bytes | Mapping) else tuple(value)
+    except Exception as why:  # it is none, or its own code fails
+        raise wrong_argument(where, name, value, expected) from why
+    if found is None or not all(isinstance(one, kind) for one in found):
+        raise wrong_argument(where, name, value, expected)
+    return found
+
+
+def wrong_argument(where: str, name: str, value: object, expected: str) -> UsageError:
+    """The refusal of an argument that is another thing than ``expected`` says."""
+    shown = getattr(value, "__name__", None) if isinstance(value, type) or callable(value) else _own_text(value, repr)
+    words = f" {shown[:60]}" if isinstance(shown, str) and shown[:1] not in ("", "<") else ""
+    given = "None" if value is None else f"{type(value).__name__}{words}"
+    return UsageError(f"{name} is {expected}; given {given}", where=where)
+
+
+def raised(why: Exception) -> str:
+    """What a stranger's code raised, in words: the type, and what it says."""
+    words = _own_text(why, str)[:300]
+    return f"{type(why).__name__}: {words}" if words else type(why).__name__
+
+
+def _own_text(value: object, of: Callable[[object], str]) -> str:
+    """The text that a stranger's object has for itself; empty if its code fails."""
+    try:
+        return of(value)
+    except Exception:  # whatever that code raises, and ValueError for a number of more than 4300 digits
+        return ""
 
 
 class NoMission(GcsplanError, RuntimeError):

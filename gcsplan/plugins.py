@@ -13,7 +13,7 @@ from functools import cache
 from importlib import import_module
 from typing import Any
 
-from gcsplan.errors import GcsplanError, InputError, UsageError
+from gcsplan.errors import GcsplanError, InputError, raised, wrong_argument
 
 __all__ = [
     "OPTIMISERS_ADDED", "OUTPUTS", "PLANNERS", "ZONE_READERS", "Added", "failing", "function_at", "register_optimiser",
@@ -33,11 +33,10 @@ class Added:
     def register(self, name: str, function: Callable[..., Any]) -> None:
         """Add a function for this process; a later one of the same name replaces it. Raises UsageError."""
         if not isinstance(name, str) or not _ADDED_NAME.fullmatch(name.removeprefix(".")):
-            raise UsageError(
-                f"a name has letters, digits, . _ and - (64 at most), given {str(name)[:64]!r}", where=self.group
-            )
+            expected = "text of letters, digits, . _ and - (64 characters at most)"
+            raise wrong_argument(self.group, "a name", name, expected)
         if not callable(function):
-            raise UsageError(f"{name} must be a function, given {type(function).__name__}", where=self.group)
+            raise wrong_argument(self.group, name, function, "a function")
         self._registered[name] = function
 
     def forget(self) -> None:
@@ -95,7 +94,7 @@ def failing(where: str) -> Iterator[None]:
     except GcsplanError:
         raise
     except Exception as why:
-        raise InputError(f"failed with {type(why).__name__}: {str(why)[:300]}", where=where) from why
+        raise InputError(f"failed with {raised(why)}", where=where) from why
 
 
 def register_planner(name: str, function: Callable[..., Any]) -> None:

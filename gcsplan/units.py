@@ -107,8 +107,9 @@ def units_of(name: str | Units) -> Units:
     """The system of a name. Raises UsageError for another name."""
     if isinstance(name, Units):
         return name
-    if name not in SYSTEMS:
-        raise UsageError(f"units must be {', '.join(SYSTEMS)}, given {name!r}")
+    if not isinstance(name, str) or name not in SYSTEMS:
+        given = repr(name[:64]) if isinstance(name, str) else type(name).__name__
+        raise UsageError(f"units must be {', '.join(SYSTEMS)}, given {given}")
     return SYSTEMS[name]
 
 

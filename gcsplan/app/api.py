@@ -31,7 +31,7 @@ from gcsplan.app.upload import run as uploads
 from gcsplan.app.upload.job import LINK, JobResult, ProgressCall, UploadOptions
 from gcsplan.check.judge import judge
 from gcsplan.check.verdict import Verdict
-from gcsplan.errors import CheckFailed, NoMission, UsageError
+from gcsplan.errors import CheckFailed, NoMission, UsageError, elements, wrong_argument
 from gcsplan.export.outdir import retire_outputs, settle_outputs, steady, write_outputs, write_whole
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.mission_file import MissionFile, load_mission
@@ -150,7 +150,9 @@ def write(
         ...     [file.name for file in write(planned, folder)]
         ['uav1.waypoints', 'uav1.plan', 'uav1.param', 'mission.kml', 'mission.geojson', 'profile.csv', 'summary.json']
     """
-    require("write", planned=planned, folder=folder)
+    require(
+        "write", planned=planned, folder=folder, report=report, way_home=way_home, allow_unjudged=allow_unjudged,
+    )  # fmt: skip
     system = units_of(units)
     settle_outputs(folder)
     try:
@@ -192,8 +194,9 @@ def report(
         >>> report(planned, way_home=False).startswith("<!DOCTYPE html>")
         True
     """
-    require("report", planned=planned, file=file)
+    require("report", planned=planned, file=file, way_home=way_home)
     system = units_of(units)
+    results = elements("report()", "results", results, JobResult, "the results of upload()")
     text = outputs.report_of(planned, results, returns.homes_of(planned) if way_home else {}, system)
     if file is not None:
         write_whole(Path(file), text)
@@ -226,11 +229,17 @@ def upload(
     raises nothing; `gcsplan.app.upload.run.exit_code` sums them up. Raises UsageError for bad targets, and, before
     anything is sent, CheckFailed if a verdict does not pass, or a return with ``way_home: required``.
     """
-    require("upload", planned=planned, to=to, timeout_s=timeout_s, progress=progress)
+    require(
+        "upload", planned=planned, to=to, timeout_s=timeout_s, progress=progress, atomic=atomic,
+        allow_unjudged=allow_unjudged, allow_armed=allow_armed, ignore_position=ignore_position,
+        allow_parameters=allow_parameters,
+    )  # fmt: skip
     if isinstance(to, Mapping):
         words = [f"{name}={url}" for name, url in to.items()]
     else:
-        words = [to] if isinstance(to, str) else list(to)
+        words = (
+            [to] if isinstance(to, str) else list(elements("upload()", "to", to, str, "a URL, or a list of NAME=URL"))
+        )
     targets = uploads.targets(words, [v.request.vehicle for v in planned.vehicles])
     require_passing({v.name: v.verdict for v in planned.vehicles if v.name in targets}, allow_unjudged=allow_unjudged)
     homes = returns.judged(planned, home=False)
@@ -274,7 +283,10 @@ def rehearse(
         runs=runs, seed=seed, progress=progress, jobs=jobs,
     )  # fmt: skip
     returns.judged(planned, home=False)
-    weather = Weather(wind_m_s, from_deg, gusts_m_s, noise_m)
+    if seed < 0:
+        raise wrong_argument("rehearse()", "seed", seed, "a whole number, 0 or more")
+    from_deg = None if from_deg is None else float(from_deg)
+    weather = Weather(float(wind_m_s), from_deg, float(gusts_m_s), float(noise_m))
     return rehearsing.rehearse(
         planned, weather=weather, runs=runs, seed=seed, progress=progress, jobs=jobs, cluster=cluster
     )
@@ -300,7 +312,8 @@ def verify(
     not. Raises InputError for a bad file, UsageError for bad arguments, LinkError if nobody answers.
     """
     require(
-        "verify", file=file, url=url, sysid=sysid, tolerance_m=tolerance_m, timeout_s=timeout_s
+        "verify", file=file, url=url, sysid=sysid, tolerance_m=tolerance_m, timeout_s=timeout_s,
+        allow_parameters=allow_parameters,
     )  # fmt: skip
     source = within.source if isinstance(within, Plan) else within
     if source is not None and not isinstance(source, MissionFile):
@@ -332,7 +345,7 @@ def clear(
 
     Raises VehicleRefused, LinkError, and UsageError for another ``kind``.
     """
-    require("clear", url=url, kind=kind, sysid=sysid, timeout_s=timeout_s)
+    require("clear", url=url, kind=kind, sysid=sysid, allow_armed=allow_armed, timeout_s=timeout_s)
     uploads.clear(url, sysid, kind, allow_armed=allow_armed, timeout_s=timeout_s)
 
 
@@ -364,8 +377,11 @@ def new(
     from gcsplan.mission_file.new_file import Draft, place_text
     from gcsplan.vehicle import Autopilot
 
-    require("new", start=start, goal=goal, flat_m=flat_m, min_agl_m=min_agl_m, sysid=sysid, file=file)
-    rasters = (dem,) if isinstance(dem, str) else tuple(dem)
+    require(
+        "new", start=start, goal=goal, flat_m=flat_m, min_agl_m=min_agl_m, sysid=sysid, file=file,
+        vertical_datum=vertical_datum, autopilot=autopilot,
+    )  # fmt: skip
+    rasters = (dem,) if isinstance(dem, str) else elements("new()", "dem", dem, str, "names of raster files")
     if bool(rasters) == (flat_m is not None):
         raise UsageError("the ground is `dem` or `flat_m`: give one of them", where="new()")
     if autopilot not in tuple(Autopilot):
@@ -375,11 +391,12 @@ def new(
     except ValueError as why:
         raise UsageError(f"start and goal are places: {why}", where="new()") from None
     target = Path("mission.yaml" if file is None else file)
-    if file is not None and target.exists():
+    if file is not None and os.path.exists(target):  # False for a name that no file can have
         raise UsageError(f"{target} is there already; give another name, or remove it", where="new()")
     draft = Draft(
-        start=begin, goal=end, dem=rasters, vertical_datum=vertical_datum, flat_m=flat_m,
-        autopilot=Autopilot(autopilot), sysid=sysid, min_agl_m=min_agl_m,
+        start=begin, goal=end, dem=rasters, vertical_datum=vertical_datum,
+        flat_m=None if flat_m is None else float(flat_m),
+        autopilot=Autopilot(autopilot), sysid=int(sysid), min_agl_m=float(min_agl_m),
     )  # fmt: skip
     names = {key: option.removeprefix("--").replace("-", "_") for key, option in OPTIONS.items()}
     text, _ = checked_text(draft, target, names)
@@ -410,7 +427,8 @@ def fetch_dem(
     from gcsplan.dem.fetch import Fetch
 
     require(
-        "fetch_dem", around=around, radius_km=radius_km, tiles=tiles, source=source, progress=progress
+        "fetch_dem", around=around, radius_km=radius_km, tiles=tiles, source=source, progress=progress, mirror=mirror,
+        offline=offline,
     )  # fmt: skip
     chosen, cells = tiles_of(mission, around, radius_km, tiles, source)
     cache = Cache(chosen)

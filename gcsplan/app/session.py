@@ -25,13 +25,23 @@ from gcsplan.app.fleet import pipeline
 from gcsplan.app.plan.arguments import require
 from gcsplan.app.plan.model import Plan
 from gcsplan.arrays import Floats
-from gcsplan.errors import InputError, UsageError, cancelled_by, heed_cancel, unknown_name
+from gcsplan.errors import (
+    InputError,
+    UsageError,
+    cancelled_by,
+    elements,
+    heed_cancel,
+    require_kind,
+    unknown_name,
+    wrong_argument,
+)
 from gcsplan.mission_file import load_mission
 from gcsplan.mission_file.kept import KeptWorld
 from gcsplan.mission_file.load import load_content
 from gcsplan.mission_file.request import Content, MissionFile
 from gcsplan.mission_file.source import read_content
 from gcsplan.planners.problem import Problem, Progress, Solution
+from gcsplan.plugins import failing
 
 __all__ = ["BetterPath", "Planner"]
 
@@ -239,17 +249,23 @@ class _Listening:
 
 def _changed(content: Content, changes: Mapping[str, object]) -> Content:
     """The content with other values of some keys. Raises InputError, UsageError."""
-    if not isinstance(changes, Mapping):
-        raise UsageError(
-            "changes are a mapping from keys to values, such as {'limits.min_agl_m': 40}", where="change()"
-        )
-    given, held = copy.deepcopy(content.given), dict(content.held)
-    for place, value in changes.items():
+    expected = "a mapping from keys to values, such as {'limits.min_agl_m': 40}"
+    require_kind("change()", "changes", changes, Mapping, expected)
+    given, held = dict(content.given), dict(content.held)
+    touched: set[str] = set()  # sections of which ``given`` has its own copy
+    for place, value in elements("change()", "changes", changes.items(), tuple, expected):
         if not isinstance(place, str):
-            raise UsageError(f"a key is named by text, such as 'limits.min_agl_m'; given {place!r}", where="change()")
-        _put(given, place, value)
-    given = read_content(given, None, held=held)[2]  # arrays, GeoJSON and tuples as in any mapping
-    text = repr(given)
+            raise wrong_argument("change()", "a key", place, "named by text, such as 'limits.min_agl_m'")
+        first = _STEP.match(place)
+        section = "" if first is None else str(first[1])
+        if section in given and section not in touched:
+            given[section] = copy.deepcopy(given[section])
+        touched.add(section)
+        with failing(f"change(): {place[:80]}"):  # a stranger's mapping
+            _put(given, place, value)
+    new = {section: given[section] for section in touched if section in given}
+    given |= read_content(new, None, held=held)[2]  # arrays, GeoJSON and tuples as in any mapping
+    text = repr(given) if held else ""
     return replace(content, given=given, held={name: data for name, data in held.items() if repr(name) in text})
 
 

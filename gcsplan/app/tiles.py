@@ -9,7 +9,7 @@ from typing import Any
 from gcsplan.dem import DEFAULT_SOURCE
 from gcsplan.dem.cache import MissingTiles
 from gcsplan.dem.sources import MOST_TILES_OF_AREA, SOURCES, DemSource, cells_in
-from gcsplan.errors import InputError, UsageError, unknown_name
+from gcsplan.errors import PATH_KINDS, InputError, UsageError, require_kind, unknown_name
 from gcsplan.mission_file import load_mission
 from gcsplan.mission_file.values.places import read_place
 from gcsplan.world.geodesy.frame import Frame
@@ -47,6 +47,8 @@ def _of_mission(
     mission: str | os.PathLike[str] | Mapping[str, Any], source: str | None
 ) -> tuple[DemSource, Sequence[Cell]]:
     """The source that a mission names, and the tiles that it needs: all of them, or the missing ones."""
+    expected = "the path of a mission file, or a mapping"
+    require_kind("fetch_dem()", "mission", mission, (Mapping, *PATH_KINDS), expected)
     path = "mission" if isinstance(mission, Mapping) else os.fspath(mission)
     try:
         inputs = load_mission(mission).inputs

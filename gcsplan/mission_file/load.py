@@ -7,14 +7,16 @@ Each mistake has its file, its key path, the given value and the required one. T
 from __future__ import annotations
 
 import logging
+import math
 import os
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
 from functools import partial
+from itertools import chain
 from typing import Any, get_args
 
-from gcsplan.errors import InputError, Mistake, heed_cancel
+from gcsplan.errors import InputError, Mistake, UsageError, elements, heed_cancel, require_kind, wrong_argument
 from gcsplan.mavlink.mission.mission import AltitudeFrame
 from gcsplan.mission_file.changes import MissionChange, changed
 from gcsplan.mission_file.kept import KeptWorld, ReadZones
@@ -161,9 +163,16 @@ def load_mission(
     if "version" in raw and (raw["version"] != 1 or isinstance(raw["version"], bool | float)):
         words = f"this gcsplan reads version 1, given {shown(raw['version'])}; write `version: 1`, or update gcsplan"
         raise InputError(words, where=f"{where}: version")
-    names = None if planner_names is None else tuple(planner_names)
-    keys = [MissionChange("", "terrain", key, value) for key, value in (terrain or {}).items()]
-    made = changed(raw, [*keys, *changes], file.parent)
+    of = "load_mission()"
+    names = None if planner_names is None else elements(of, "planner_names", planner_names, str, "names of planners")
+    made_by_caller = elements(of, "changes", changes, MissionChange, "a list of MissionChange")
+    if departure is not None:
+        require_kind(of, "departure", departure, datetime, "a datetime")
+    if terrain is not None:
+        require_kind(of, "terrain", terrain, Mapping, "a mapping of keys of the section terrain")
+    section = read_content({"terrain": terrain or {}}, None, held)[2]["terrain"]
+    keys = [MissionChange("", "terrain", key, value) for key, value in section.items()]
+    made = changed(raw, [*keys, *made_by_caller], file.parent)
     return load_content(
         Content(
             file,
@@ -171,7 +180,7 @@ def load_mission(
             made.raw,
             written,
             names,
-            tuple(around),
+            _places(around),
             departure,
             texts_of(at),
             made.options,
@@ -179,6 +188,22 @@ def load_mission(
             held,
         )
     )
+
+
+def _places(around: Any) -> tuple[tuple[float, float], ...]:
+    """The places of ``around``. Raises UsageError."""
+    expected = "places as pairs of latitude and longitude in degrees"
+    try:
+        found = tuple(
+            (float(lat), float(lon)) for lat, lon in elements("load_mission()", "around", around, object, expected)
+        )
+        if all(map(math.isfinite, chain.from_iterable(found))):
+            return found
+    except UsageError:
+        raise
+    except Exception as why:  # a stranger's numbers
+        raise wrong_argument("load_mission()", "around", around, expected) from why
+    raise wrong_argument("load_mission()", "around", around, expected)
 
 
 def load_content(content: Content, kept: KeptWorld | None = None) -> MissionFile:
@@ -313,7 +338,8 @@ class _MissionReading:
         if not isinstance(value, str) or not value.strip() or len(value) > 300:
             words = f"must be text, 300 characters at most, given {shown(value)}"
             self.problems.append(Mistake(f"{self.where}name", words))
-        return one_line(str(value))
+            return self.file.stem
+        return one_line(value)
 
     def _choice(self, key: str, choices: tuple[str, ...], default: str) -> Any:
         value = self.raw.get(key)

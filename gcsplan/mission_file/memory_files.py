@@ -16,10 +16,10 @@ from typing import Any
 
 import numpy as np
 
-from gcsplan.errors import InputError
+from gcsplan.errors import InputError, raised
 from gcsplan.world.terrain.raster import MAX_CELLS, missing, require_numbers
 
-__all__ = ["with_rasters", "with_zones"]
+__all__ = ["copied", "geojson_bytes", "with_rasters", "with_zones"]
 
 GEOJSON = frozenset(
     {
@@ -48,7 +48,7 @@ def with_rasters(terrain: Any, where: str, held: dict[str, bytes]) -> Any:
         for k, one in enumerate(dem if several else [dem]):
             name = one if isinstance(one, str) else f"terrain.dem[{k}]" if several else "terrain.dem"
             if _is_raster(one):
-                held[name] = _made(at, _geotiff, one, None, None, at)
+                held[name] = copied(at, _geotiff, one, None, None, at)
             names.append(name)
         if "transform" in terrain:
             raise InputError(f"belongs to an array; a {type(dem).__name__} has its own", where=f"{where}.transform")
@@ -60,12 +60,13 @@ def with_rasters(terrain: Any, where: str, held: dict[str, bytes]) -> Any:
         raise InputError(f"is missing: an array needs its coordinate system, {CRS_CURE}", where=f"{where}.crs")
     system = None if isinstance(crs, str) else crs  # a text goes the way of every mission file
     if system is not None:
+        system = _system(system, f"{where}.crs")
         del keys["crs"]
     given = terrain.get("transform")
     if given is None:
         raise InputError(f"is missing: an array needs its six numbers, {TRANSFORM_CURE}", where=f"{where}.transform")
     transform = _transform(given, f"{where}.transform")
-    held["terrain.dem"] = _made(at, _geotiff, np.ma.asanyarray(dem), transform, system, at)
+    held["terrain.dem"] = copied(at, _geotiff, np.ma.asanyarray(dem), transform, system, at)
     return {**keys, "dem": "terrain.dem"}
 
 
@@ -83,23 +84,23 @@ def with_zones(zones: Any, where: str, held: dict[str, bytes]) -> Any:
         names = (f"{where.rpartition(': ')[2]}[{i}]{f'.{k}' if k > 1 else ''}.geojson" for k in count(1))
         name = next(name for name in names if name not in held)
         if _is_geojson(entry):
-            held[name] = _made(at, _json, entry, at)
+            held[name] = copied(at, geojson_bytes, entry, at)
             entry = {"file": name}
         elif isinstance(entry, Mapping) and (_is_geojson(entry.get("file")) or isinstance(entry.get("file"), Mapping)):
-            held[name] = _made(f"{at}.file", _json, entry["file"], f"{at}.file")
+            held[name] = copied(f"{at}.file", geojson_bytes, entry["file"], f"{at}.file")
             entry = {**entry, "file": name}
         out.append(entry)
     return out
 
 
-def _made(where: str, make: Callable[..., bytes], *given: Any) -> bytes:
+def copied(where: str, make: Callable[..., bytes], *given: Any) -> bytes:
     """What ``make`` makes of a stranger's object, whose methods may raise anything. Raises InputError."""
     try:
         return make(*given)
     except InputError as why:
         raise InputError(why.message, where=why.where or where) from why
     except Exception as why:
-        raise InputError(f"cannot be read: {type(why).__name__}: {str(why)[:200]}", where=where) from why
+        raise InputError(f"cannot be read: {raised(why)}", where=where) from why
 
 
 def _is_array(value: Any) -> bool:
@@ -114,7 +115,8 @@ def _is_raster(value: Any) -> bool:
 def _is_geojson(value: Any) -> bool:
     """Whether it is GeoJSON or says that it can be."""
     if isinstance(value, Mapping):
-        return value.get("type") in GEOJSON
+        kind = value.get("type")
+        return isinstance(kind, str) and kind in GEOJSON
     return hasattr(type(value), "__geo_interface__") or hasattr(value, "__geo_interface__")
 
 
@@ -122,7 +124,7 @@ def _transform(given: Any, where: str) -> tuple[float, ...]:
     """The six numbers of an affine map from column and row to x and y. Raises InputError."""
     try:
         six = tuple(float(x) for x in list(given)[:6])
-    except (TypeError, ValueError):
+    except Exception:  # a stranger's numbers
         six = ()
     if len(six) != 6 or not all(map(math.isfinite, six)):
         raise InputError(f"must be six numbers, {TRANSFORM_CURE}", where=where)
@@ -132,6 +134,17 @@ def _transform(given: Any, where: str) -> tuple[float, ...]:
             where=where,
         )
     return six
+
+
+def _system(given: Any, where: str) -> Any:
+    """A coordinate system of rasterio or pyproj, or its number, as rasterio's. Raises InputError."""
+    import rasterio
+
+    try:
+        return rasterio.crs.CRS.from_user_input(given)
+    except Exception as why:  # rasterio's and GDAL's errors, and what a stranger's object raises
+        words = f"must be a coordinate system, {CRS_CURE}; given {type(given).__name__}"
+        raise InputError(words, where=where) from why
 
 
 def _geotiff(source: Any, transform: Any, crs: Any, where: str) -> bytes:
@@ -224,13 +237,13 @@ def _require_few(shape: Any, where: str) -> None:
         )
 
 
-def _json(value: Any, where: str) -> bytes:
+def geojson_bytes(value: Any, where: str) -> bytes:
     """The text of GeoJSON in WGS 84. Raises InputError."""
     if hasattr(value, "to_crs") and hasattr(value, "to_json"):  # a GeoDataFrame or GeoSeries, in a system of its own
         if value.crs is None:
             raise InputError("states no coordinate system: set_crs(4326) for degrees", where=where)
         return str(value.to_crs(4326).to_json()).encode()
-    whole = value if isinstance(value, Mapping) else value.__geo_interface__
+    whole = value if isinstance(value, Mapping) or not _is_geojson(value) else value.__geo_interface__
     return json.dumps(whole, default=_plain).encode()
 
 

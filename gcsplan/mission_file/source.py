@@ -15,7 +15,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from gcsplan.errors import InputError, UsageError
+from gcsplan.errors import PATH_KINDS, InputError, UsageError, raised, require_kind, wrong_argument
 from gcsplan.mission_file.memory_files import with_rasters, with_zones
 from gcsplan.mission_file.values.schema import nearest, shown, text_keys
 from gcsplan.mission_file.values.yaml import (
@@ -68,6 +68,12 @@ def _sample_folder() -> Path:
     return next((folder for folder in SAMPLE_FOLDERS if folder.is_dir()), SAMPLE_FOLDERS[0])
 
 
+MOST_OF_A_NAME = 300
+"""Most characters of a file's name in a message, where the name may be what is wrong."""
+
+MOST_BITS = 4096
+"""Most bits of a whole number; Python makes no text of those that have very many more."""
+
 UNNAMED = Path("mission.yaml")
 """Path of a mission that has no file; files that the mission names are then found from the current folder."""
 
@@ -83,6 +89,9 @@ def read_content(
     Raises InputError and UsageError as `load_mission`.
     """
     held = {} if held is None else held
+    expected = "a path, the text of a mission file, or a mapping"
+    if text is not None:
+        require_kind("load_mission()", "text", text, str, "the text of a mission file")
     if isinstance(source, str) and ("\n" in source or "\r" in source):
         if text is not None:
             raise UsageError(
@@ -93,7 +102,8 @@ def read_content(
         if text is not None:
             raise UsageError("load_mission takes a mapping or a text, not both", where="text")
         file, where, raw = UNNAMED, "mission", _Plain(held).of(source, "mission", 0)
-    elif isinstance(source, str | os.PathLike):
+    elif isinstance(source, os.PathLike) or (isinstance(source, str) and source):
+        require_kind("load_mission()", "source", source, PATH_KINDS, expected)
         file, where = Path(source), str(source)
         if text is None:
             file = file_of(source)
@@ -103,10 +113,7 @@ def read_content(
     elif source is None and text is not None:
         file, where, raw = UNNAMED, "mission", read_yaml(text, where="mission")
     else:
-        raise UsageError(
-            f"load_mission takes a path, the text of a mission file, or a mapping, given {type(source).__name__}",
-            where="source",
-        )
+        raise wrong_argument("load_mission()", "source", source, expected)
     if not isinstance(raw, dict):
         tight = missing_space(raw) if isinstance(raw, str) else ""
         words = f"a mission file is a mapping of keys (version, terrain, …), given {shown(raw)}"
@@ -147,7 +154,8 @@ def _text(file: Path, where: str) -> str:
     except FileNotFoundError:
         raise InputError(f"there is no such file{sample_hint(file)}", where=where) from None
     except (OSError, ValueError) as why:
-        raise InputError(f"the file cannot be read: {why}", where=where) from None
+        words = getattr(why, "strerror", None) or str(why)  # without the name, which stands before
+        raise InputError(f"the file cannot be read: {words}", where=where[:MOST_OF_A_NAME]) from None
 
 
 class _Plain:
@@ -160,7 +168,16 @@ class _Plain:
         self._values, self._held = 0, held
 
     def of(self, value: Any, where: str, depth: int, key: str = "") -> Any:
-        """``value`` of ``key`` at ``where``, which is ``depth`` levels deep."""
+        """``value`` of ``key`` at ``where``, which is ``depth`` levels deep. Raises InputError, also for what the
+        value's own methods raise."""
+        try:
+            return self._of(value, where, depth, key)
+        except InputError:
+            raise
+        except Exception as why:
+            raise InputError(f"cannot be read: {raised(why)}", where=where) from why
+
+    def _of(self, value: Any, where: str, depth: int, key: str) -> Any:
         self._values += 1
         if depth == 1 and key in ("terrain", "no_fly", "keep_in"):
             value = (with_rasters if key == "terrain" else with_zones)(value, where, self._held)
@@ -172,6 +189,8 @@ class _Plain:
         for kind in (bool, int, float, str):
             if isinstance(value, kind):
                 plain = kind(value)
+                if isinstance(plain, int) and plain.bit_length() > MOST_BITS:
+                    raise InputError("is a number of more digits than any key takes", where=where)
                 return number_or_text(plain) if isinstance(plain, str) and key not in text_keys() else plain
         if isinstance(value, os.PathLike):
             return os.fspath(value)

@@ -5,12 +5,12 @@ Published formats are known likewise: OpenAir by its name, the others by members
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from gcsplan.errors import InputError
+from gcsplan.mission_file.memory_files import copied, geojson_bytes
 from gcsplan.mission_file.published.ed269 import is_ed269, is_ed269_geojson, read_ed269, read_ed269_geojson
 from gcsplan.mission_file.published.ed318 import is_ed318, read_ed318
 from gcsplan.mission_file.published.openaip import is_openaip, read_openaip
@@ -103,8 +103,10 @@ def read_zones(
 
 def geojson_by(read: Callable[[bytes], Any], path: Path, data: bytes) -> bytes:
     """The GeoJSON that the reader of another package makes of a file. Raises InputError."""
-    with failing(f"{path}: its reader"):
-        return json.dumps(read(data)).encode()
+    where = f"{path}: its reader"
+    with failing(where):
+        found = read(data)
+    return copied(where, geojson_bytes, found, where)
 
 
 def _read(path: Path, kind: str, data: bytes, layer: str | None, whole: Any) -> ZoneFile:

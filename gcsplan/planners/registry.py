@@ -6,7 +6,9 @@ Cheap to import: a package is imported only when one of its planners is named.
 from __future__ import annotations
 
 import inspect
+import math
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from importlib import import_module
 from types import MappingProxyType
@@ -14,6 +16,7 @@ from typing import cast
 
 import numpy as np
 
+from gcsplan.arrays import Floats
 from gcsplan.errors import InputError, NoMission, needs, unknown_name
 from gcsplan.planners.problem import Problem, Refusal, Solution, passes_vias
 from gcsplan.plugins import PLANNERS, failing, function_at
@@ -74,18 +77,20 @@ def _looked_at(found: object, problem: Problem, where: str) -> Solution:
     """A stranger's solution as a path alone. Raises InputError."""
     if not isinstance(found, Solution):
         raise InputError(f"a planner returns a Solution, given {type(found).__name__}", where=where)
-    points = np.asarray(getattr(found.path, "points", None), dtype=object)
-    try:
-        points = points.astype(np.float64)
-    except (TypeError, ValueError):
-        points = np.empty(0)
+    points: Floats = np.empty(0)
+    times_s = math.nan, math.nan
+    with suppress(Exception):  # whatever a stranger's numbers raise: they are none
+        times_s = float(found.planning_s), float(found.first_path_s)
+        points = np.asarray(found.path.points, dtype=object).astype(np.float64)
+    if not all(0.0 <= time_s < math.inf for time_s in times_s):
+        raise InputError("planning_s and first_path_s are seconds, 0 or more", where=where)
     if points.ndim != 2 or points.shape[1] != 3 or len(points) < 2 or not np.isfinite(points).all():
         raise InputError("a path is an array (N, 3) of finite east_m, north_m, amsl_m", where=where)
     off_m = np.abs(points[[0, -1]] - np.array([problem.start, problem.goal])).max()
     if off_m > ENDS_OFF_M or not passes_vias(problem, points):
         words = f"by {off_m:.3f} m at an end" if off_m > ENDS_OFF_M else "a via is not passed"
         raise InputError(f"a path leads from problem.start by problem.via to problem.goal: {words}", where=where)
-    return Solution(Path(points), planning_s=float(found.planning_s), first_path_s=float(found.first_path_s))
+    return Solution(Path(points), planning_s=times_s[0], first_path_s=times_s[1])
 
 
 _SWARM_NAMES = (
@@ -114,7 +119,7 @@ def get(name: str) -> PlannerEntry:
         added = function_at(name, "planner") if ":" in name else PLANNERS.get(name)
         if added is not None:
             return own(added, name)
-        raise unknown_name(f"there is no planner {name!r}", name, names())
+        raise unknown_name(f"there is no planner {name[:64]!r}", name, names())
     with needs(PLANNER_PACKAGES[name], f"the planner {name!r}"):
         return cast(PlannerEntry, import_module(PLANNER_PACKAGES[name]).entry(name))
 

@@ -161,7 +161,7 @@ def test_what_is_wrong_with_a_mission_is_told_with_its_place(source: Any, text: 
 
 def test_what_is_no_mission_at_all_is_a_mistake_of_the_script() -> None:
     for given in ((), (7,)):
-        with pytest.raises(UsageError, match="takes a path, the text of a mission file, or a mapping"):
+        with pytest.raises(UsageError, match="is a path, the text of a mission file, or a mapping"):
             load_mission(*given)
     for source in ("a: 1\n", {"a": 1}):
         with pytest.raises(UsageError, match="load_mission takes"):

@@ -113,7 +113,7 @@ def test_a_dataset_in_gdals_memory_is_read_while_it_is_open(tmp_path: Path) -> N
         ({"dem": HEIGHTS.astype(complex)}, r"terrain\.dem: must be heights as numbers"),
         ({"dem": HEIGHTS.astype(object)}, r"terrain\.dem: must be heights as numbers"),
         ({"vertical_datum": None}, r"terrain\.vertical_datum: .* add `vertical_datum:`"),
-        ({"crs": object()}, r"terrain\.dem: cannot be read"),
+        ({"crs": object()}, r"terrain\.crs: must be a coordinate system"),
         ({"crs": "EPSG:99999"}, r"state it with `crs:`"),
         ({"transform": (1.0, 0.0, 0.0, 0.0, 1.0, 0.0)}, r"terrain\.dem"),
         ({"dem": HEIGHTS * 100.0}, r"holds nothing but voids"),

@@ -90,7 +90,7 @@ def test_a_file_that_cannot_be_read_is_told(tmp_path: Path) -> None:
         "": "folder",
         "latin.yaml": "UTF-8",
         "big.yaml": "at most",
-        "a\0b": "cannot be read",
+        "a\0b": "source is a path",
     }
     for name, words in cases.items():
         with pytest.raises(InputError, match=words):

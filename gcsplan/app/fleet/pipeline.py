@@ -20,7 +20,7 @@ from gcsplan.app.parallel.sites import world_of
 from gcsplan.app.plan.arguments import require
 from gcsplan.app.plan.left_out import LeavingOut
 from gcsplan.app.plan.model import Brief, Plan, PlanOptions, VehiclePlan
-from gcsplan.errors import InputError, NoMission, unknown_name
+from gcsplan.errors import InputError, NoMission, elements, unknown_name, wrong_argument
 from gcsplan.mission_file import MissionFile, load_mission
 from gcsplan.planners.problem import Problem, Progress, Solution
 from gcsplan.planners.registry import VOLUME_KEYS, AddedEntry
@@ -90,7 +90,8 @@ def plan(  # noqa: PLR0913 - options by name, each with a default
         source = load_mission(source, departure=gate_utc, at=at)
     elif at is not None:
         raise InputError("the mission is read already: give `at` to load_mission", where="at")
-    brief = _brief_of(source, PlanOptions(planner, objective, seed, options or {}))
+    keys = dict(elements("plan()", "options", (options or {}).items(), tuple, "a mapping of a planner's keys"))
+    brief = _brief_of(source, PlanOptions(planner, objective, seed, keys))
     if leave_out is None:
         leave_out = source.arrival is not None and source.arrival.leave_out
     leaving = LeavingOut(allowed=leave_out)
@@ -105,7 +106,7 @@ def _brief_of(source: MissionFile, given: PlanOptions) -> Brief:
     name = entry.name
     goal = given.objective or source.planner.objective
     if goal not in ("length", "energy"):
-        raise InputError(f"objective must be length or energy, given {goal!r}")
+        raise wrong_argument("plan()", "objective", goal, "'length' or 'energy'")
     merged = _options(source, name) | dict(given.options)
     if entry.warm_starts:
         _require_warm_start(source, merged)

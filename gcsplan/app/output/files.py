@@ -88,7 +88,10 @@ def _added(plan: Plan, own: Mapping[str, str]) -> dict[str, str]:
         where, write = f"output {name}", OUTPUTS.get(name)
         assert write is not None
         with failing(where):
-            found = dict(write(plan))
+            written = write(plan)
+            found = dict(written) if isinstance(written, Mapping) else {"": None}
+            for text in found.values():
+                _ = text.encode() if isinstance(text, str) else b""  # UnicodeEncodeError: half of a character
         for file, text in found.items():
             if not isinstance(file, str) or not isinstance(text, str):
                 raise InputError("an output is a mapping from file names to texts", where=where)

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from datetime import datetime
 from numbers import Integral, Real
-from os import PathLike
 from typing import Any
 
 from gcsplan.app.plan.model import Plan
-from gcsplan.errors import UsageError
+from gcsplan.errors import PATH_KINDS, require_kind
 
 __all__ = ["require"]
 
@@ -25,10 +24,22 @@ EXPECTED: dict[str, tuple[Any, str]] = {
     "jobs": (Integral, "a number of processes"),
     "leave_out": (bool, "True or False"),
     "planned": (Plan, "a plan, as gcsplan.plan returns it"),
-    "folder": ((str, PathLike), "the path of a folder"),
-    "file": ((str, PathLike), "the path of a file"),
-    "what": ((str, PathLike), "a plan, a mission, or the path of a .waypoints or .plan file"),
+    "folder": (PATH_KINDS, "the path of a folder"),
+    "file": (PATH_KINDS, "the path of a file"),
+    "what": (PATH_KINDS, "a plan, a mission, or the path of a .waypoints or .plan file"),
     "vehicle": (str, "the name of a vehicle"),
+    "report": (bool, "True or False"),
+    "way_home": (bool, "True or False"),
+    "allow_unjudged": (bool, "True or False"),
+    "allow_armed": (bool, "True or False"),
+    "allow_parameters": (bool, "True or False"),
+    "ignore_position": (bool, "True or False"),
+    "offline": (bool, "True or False"),
+    "mirror": (str, "the URL of a mirror"),
+    "atomic": (bool, "True or False"),
+    "units": (str, "the name of a system of units: metric, imperial or aviation"),
+    "vertical_datum": (str, "the name of a vertical datum, such as 'EGM96'"),
+    "autopilot": (str, "the name of an autopilot, such as 'arducopter'"),
     "runs": (Integral, "a whole number"),
     "wind_m_s": (Real, "a number"),
     "gusts_m_s": (Real, "a number"),
@@ -52,7 +63,7 @@ EXPECTED: dict[str, tuple[Any, str]] = {
 """The type of each argument by its name, and what it is in words."""
 
 NEEDED = {"planned", "folder", "what", "runs", "wind_m_s", "gusts_m_s", "noise_m", "timeout_s", "to", "url", "sysid",
-          "start", "goal", "min_agl_m", "kind"}  # fmt: skip
+          "start", "goal", "min_agl_m", "kind", "autopilot", "mirror"}  # fmt: skip
 """Arguments that cannot be None."""
 
 
@@ -60,7 +71,5 @@ def require(function: str, **given: object) -> None:
     """Raise UsageError unless each argument is of its type, or None where it may be; True and False are no numbers."""
     for name, value in given.items():
         kind, expected = EXPECTED[name]
-        wrong = not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool)
-        if wrong and (value is not None or name in NEEDED):
-            shown = getattr(value, "__name__", None) or repr(value)
-            raise UsageError(f"{name} is {expected}; given {type(value).__name__} {shown[:60]}", where=f"{function}()")
+        if value is not None or name in NEEDED:
+            require_kind(f"{function}()", name, value, kind, expected)

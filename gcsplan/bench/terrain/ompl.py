@@ -37,7 +37,10 @@ from gcsplan.world.kernels.shared import BOW_M, Demands
 
 PLANNERS = {"RRT*": "RRTstar", "InformedRRT*": "InformedRRTstar", "BIT*": "BITstar"}
 CROSSINGS = 2000
-RIVALS_CURE = "this benchmark needs OMPL and mealpy: pip install 'gcsplan[bench]', or give --no-rivals"
+RIVALS_CURE = (
+    "this benchmark compares with OMPL and mealpy: pip install 'gcsplan[bench]'; bench terrain goes without them by "
+    "--no-rivals --no-swarms"
+)
 
 OneLeg = Callable[[float, float, float, float, float, float], bool]
 """``clear(east0_m, north0_m, amsl0_m, east1_m, north1_m, amsl1_m)``."""

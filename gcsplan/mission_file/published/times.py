@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime, time, timedelta
 from typing import Any
 
-from gcsplan.errors import Mistake
+from gcsplan.errors import Mistake, elements
 
 ALONE = timedelta(hours=2)
 """How long the hours last if their beginning alone is stated."""
@@ -76,7 +76,9 @@ def texts_of(at: str | Sequence[str] | None) -> tuple[str, ...] | None:
     """The texts of an ``at`` that is given beside a mission: one, or from and to; ``FROM/TO`` is both."""
     if at is None:
         return None
-    return tuple(part.strip() for part in at.split("/")) if isinstance(at, str) else tuple(at)
+    if isinstance(at, str):
+        return tuple(part.strip() for part in at.split("/"))
+    return elements("at", "at", at, str, HOURS_TO_GIVE)
 
 
 def read_end(text: str) -> datetime:

@@ -39,7 +39,7 @@ class Weather:
         for name in ("wind_m_s", "gusts_m_s", "noise_m"):
             value = getattr(self, name)
             if not 0.0 <= value < math.inf:
-                raise InputError(f"{name} must be a number of 0 or more, given {value:g}")
+                raise InputError(f"{name} must be a number of 0 or more, given {float(value):g}")
         if self.from_deg is not None and not math.isfinite(self.from_deg):
             raise InputError(f"from_deg must be a direction in degrees, given {self.from_deg:g}")
 

@@ -23,8 +23,8 @@ from gcsplan.world.kernels.extrema import local_extrema
 from gcsplan.world.kernels.field import Field
 from gcsplan.world.kernels.shared import STRIP, LocalExtrema
 
-LARGE_WINDOW = 2_000_000
-"""Surfaces with more cells than this are examined tile by tile."""
+LARGE_WINDOW = 200_000
+"""Surfaces with more cells than this are examined tile by tile, where a plan looks at them."""
 TILE, SPACING = STRIP, 32
 """Columns and rows of a tile, and the largest spacing, in cells, of the places on a line whose tiles are examined."""
 BOW = 2
