@@ -143,6 +143,11 @@ class Planner:
         with self._state:
             self._content = _changed(self._content, changes)
 
+    def restore(self, mission: Mapping[str, object]) -> None:
+        """Set all keys to those of ``mission``, such as an earlier `mission` of this session. Raises InputError."""
+        with self._state:
+            self._content = _with_keys(self._content, mission)
+
     def plan(
         self,
         changes: Mapping[str, object] | None = None,
@@ -243,12 +248,18 @@ def _changed(content: Content, changes: Mapping[str, object]) -> Content:
         raise UsageError(
             "changes are a mapping from keys to values, such as {'limits.min_agl_m': 40}", where="change()"
         )
-    given, held = copy.deepcopy(content.given), dict(content.held)
+    given = copy.deepcopy(content.given)
     for place, value in changes.items():
         if not isinstance(place, str):
             raise UsageError(f"a key is named by text, such as 'limits.min_agl_m'; given {place!r}", where="change()")
         _put(given, place, value)
-    given = read_content(given, None, held=held)[2]  # arrays, GeoJSON and tuples as in any mapping
+    return _with_keys(content, given)
+
+
+def _with_keys(content: Content, keys: Mapping[str, object]) -> Content:
+    """The content with these keys alone: arrays, GeoJSON and tuples as in any mapping."""
+    held = dict(content.held)
+    given = read_content(keys, None, held=held)[2]
     text = repr(given)
     return replace(content, given=given, held={name: data for name, data in held.items() if repr(name) in text})
 

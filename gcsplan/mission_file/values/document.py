@@ -67,8 +67,12 @@ class _Writing:
         own = {key.value: (key, value) for key, value in node.value}
         gone = [key for key in own if key in old and key not in new]
         more = [key for key in new if key not in own and (key not in old or old[key] != new[key])]
-        if any(key not in own for key in old if key not in new) or len(gone) > len(more):
+        if any(key not in own for key in old if key not in new):
             return False  # a merged key cannot go
+        if len(gone) > len(more) and (node.flow_style or len(gone) == len(own)):
+            return False
+        if not all(self._remove(own[was]) for was in gone[len(more) :]):
+            return False
         for was, key in zip(gone, more, strict=False):  # a key in another unit
             name, value = own[was]
             self.spans.append((name.start_mark.index, _end(value), f"{key}: {flow(new[key])}"))
@@ -89,6 +93,11 @@ class _Writing:
         """The value of the key ``name`` changes from ``old`` to ``new``."""
         if isinstance(node, yaml.MappingNode) and isinstance(old, dict) and isinstance(new, dict) and node.value:
             return self.mapping(node, old, new)
+        if (
+            isinstance(node, yaml.SequenceNode) and isinstance(old, list) and isinstance(new, list)
+            and not node.flow_style and (gone := _removed(old, new))
+        ):  # fmt: skip
+            return all(self._remove(node.value[k]) for k in gone)
         if (
             isinstance(node, yaml.SequenceNode) and isinstance(old, list) and isinstance(new, list)
             and 0 < len(old) <= len(new) and all(_alike(a, b) for a, b in zip(old, new, strict=False))
@@ -117,6 +126,15 @@ class _Writing:
         at = _end(node.value[-1]) if own else node.end_mark.index - 1
         self.spans.append((at, at, (", " if own else "") + ", ".join(parts)))
 
+    def _remove(self, member: Any) -> bool:
+        """Take out the lines of a member of a block, from that of its key or dash on; a comment above them stays."""
+        name = member[0] if isinstance(member, tuple) else member
+        begin = self.text.rfind("\n", 0, name.start_mark.index) + 1
+        stop = self.text.find("\n", max(_end(member) - 1, begin))
+        self.spans.append((begin, len(self.text) if stop < 0 else stop + 1, ""))
+        before = self.text[begin : name.start_mark.index].strip()
+        return before == ("" if isinstance(member, tuple) else "-")
+
     def _below(self, node: yaml.CollectionNode, lines: list[str]) -> None:
         """In lines of their own behind the line in which a block ends."""
         end = _end(node)
@@ -125,6 +143,16 @@ class _Writing:
         stop = self.text.find("\n", end)
         stop = len(self.text) if stop < 0 else stop - self.text[:stop].endswith("\r")
         self.spans.append((stop, stop, "".join(self.line_end + line for line in lines)))
+
+
+def _removed(old: list[Any], new: list[Any]) -> list[int]:
+    """The numbers of the entries that ``new`` lacks, if it has some of ``old`` in their order, and nothing else."""
+    gone: list[int] = []
+    for k, value in enumerate(old):
+        at = k - len(gone)
+        if at >= len(new) or new[at] != value:
+            gone.append(k)
+    return gone if new and len(old) - len(gone) == len(new) else []
 
 
 def _alike(old: Any, new: Any) -> bool:
