@@ -1,0 +1,114 @@
+// The result: the verdict, the gap that counts down, the figures; or why there is no mission, and what would do.
+import { button, byId, el } from './dom.js';
+import { known, on, tell } from './hub.js';
+import { holding } from './grips.js';
+import { change } from './link.js';
+import { goTo } from './map.js';
+import { agePath, clearPath, drawNoHome, drawPath, markPlace } from './shapes.js';
+
+const LOOK = { safe: ['safe', '✓'], violations: ['unsafe', '✕'], 'not judged': ['unjudged', '?'] };
+let box = null, gap = null;
+
+export function startResult() {
+  box = el('section', { id: 'result', 'aria-label': 'Result' },
+    el('div', { class: 'verdict', id: 'verdict', role: 'status' }), el('div', { id: 'gap', hidden: true }), el('div', { id: 'rest' }));
+  on('path', path);
+  on('bound', (message) => showGap(message.gap_percent));
+  on('plan', plan);
+  on('refused', refused);
+  on('asked', () => verdict('unjudged', '…', 'Planning', 'The mission is planned and judged.'));
+  on('error', (message) => { if (message.code === 'bad_mission') nothing(message.message, 'The mission has a mistake'); });
+  on('connection', (now) => { if (now !== 'open') verdict('unjudged', '…', 'Not connected', 'The result below may be old.'); });
+  on('state', (state) => {
+    if (state.stage === 'mission') return;
+    clearPath();
+    drawNoHome([]);
+    markPlace(null);
+    known.plan = null;
+    tell('judged', null);
+    byId('rest')?.replaceChildren();
+    showGap(null);
+    verdict('unjudged', '1', 'Start and goal', 'Click both on the map, or type them below.');
+  });
+  return box;
+}
+
+function verdict(look, sign, word, words) {
+  const made = byId('verdict') || box.querySelector('.verdict');
+  made.className = `verdict ${look}`;
+  made.replaceChildren(el('span', { class: 'sign', 'aria-hidden': 'true' }, sign), el('div', {}, el('strong', {}, word), el('p', {}, words)));
+}
+
+function showGap(percent) {
+  const made = box.querySelector('#gap');
+  gap = percent;
+  made.hidden = percent === null || percent === undefined;
+  if (made.hidden) return;
+  const text = `No path is more than ${num(percent, percent < 0.095 ? 2 : 1)}${'\u202f'}% shorter`;
+  made.replaceChildren(el('span', {}, text), el('meter', { min: 0, max: 20, low: 1, value: Math.min(20, percent), 'aria-label': 'Gap, percent' }));
+}
+
+function path(message) {
+  drawPath(message.vehicle, message.line, 'draft');
+  drawNoHome([]);
+  markPlace(null);
+  byId('below').classList.add('old');
+  box.querySelector('#rest').classList.add('old');
+  if (message.live || holding()) {
+    showGap(null);
+    verdict('unjudged', '…', 'A path follows', 'It is not judged yet: release the point.');
+  } else {
+    showGap(message.gap_percent);
+    verdict('unjudged', '…', 'A path is found', 'The bound tightens; the mission is not judged yet.');
+  }
+}
+
+function plan(message) {
+  clearPath();
+  const look = LOOK[message.verdict] || LOOK['not judged'];
+  for (const v of message.vehicles) {
+    drawPath(v.vehicle, v.line, { safe: 'judged', violations: 'unsafe' }[v.verdict] || 'draft');
+  }
+  drawNoHome(message.vehicles.flatMap((v) => (v.way_home ? v.way_home.unsafe : [])));
+  markPlace(null);
+  verdict(look[0], look[1], message.verdict, message.headline);
+  showGap(null);
+  const rest = box.querySelector('#rest');
+  rest.classList.remove('old');
+  rest.replaceChildren(...message.vehicles.flatMap((v) => ofVehicle(v, message.vehicles.length > 1)));
+  tell('judged', message);
+}
+
+function ofVehicle(v, many) {
+  const rows = v.figures.filter((f) => f.key !== 'verdict').map((f) => el('div', { class: f.bad ? 'bad' : null, 'data-key': f.key },
+    el('dt', {}, f.label), el('dd', {}, f.at ? button(f.text, () => { goTo(f.at); markPlace(f.at, f.label); }, { class: 'spot', title: 'Show the place on the map' }) : f.text)));
+  const list = (name, items, open) => (items.length ? el('details', { open }, el('summary', {}, `${name} (${items.length})`), el('ul', {}, ...items.map((i) => el('li', {}, i)))) : null);
+  return [many ? el('h3', {}, v.name) : null, el('dl', {}, ...rows), list('Findings', v.findings, true),
+    v.way_home && v.way_home.unsafe.length ? el('p', { class: 'bare bad' }, v.way_home.text) : null, list('Notes', v.notes, false)].filter((p) => p);
+}
+
+// -- no mission -------------------------------------------------------------------------------------------------------
+
+function nothing(words, word) {
+  agePath();
+  drawNoHome([]);
+  byId('below').classList.add('old');
+  box.querySelector('#rest').classList.add('old');
+  showGap(null);
+  verdict('unsafe', '✕', word, words);
+}
+
+function refused(message) {
+  nothing(message.message, message.live ? 'No path here' : 'No mission');
+  markPlace(message.at, message.zone || 'here');
+  if (message.live) return;
+  const rest = box.querySelector('#rest');
+  rest.classList.remove('old');
+  rest.replaceChildren(
+    ...(message.at ? [el('p', {}, button('Show the place', () => goTo(message.at), { class: 'wide' }))] : []),
+    ...(message.cures.length ? [el('h3', {}, 'These would do'), ...message.cures.map(cure)] : []));
+}
+
+function cure(given) {
+  return el('div', { class: 'cure' }, button(given.label, () => change(given.changes), { class: 'main' }), given.text ? el('p', { class: 'note' }, given.text) : null);
+}
