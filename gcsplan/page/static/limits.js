@@ -16,11 +16,17 @@ function show(state) {
   if (keys !== shown) {
     shown = keys;
     const open = box.querySelector('details')?.open || false;
-    box.replaceChildren(...(form.length ? [el('details', { open, id: 'limit-list' }, el('summary', {}, 'Limits and vehicle'), ...form.map(row))] : []));
+    box.replaceChildren(...(form.length ? [el('details', { open, id: 'limit-list' }, el('summary', {}, 'Limits and vehicle'), ...groups(form))] : []));
   }
   for (const field of form) fill(field);
   for (const field of form) if (field.error) { box.querySelector('details').open = true; break; }
   problems(state.problems || [], form);
+}
+
+const GROUPS = { limits: 'Limits', vehicle: 'Vehicle', planner: 'Search' };
+function groups(form) {
+  const names = [...new Set(form.map((f) => f.group || 'limits'))];
+  return names.map((name) => el('fieldset', {}, el('legend', {}, GROUPS[name] || name), ...form.filter((f) => (f.group || 'limits') === name).map(row)));
 }
 
 const size = (field) => (field.quantity ? known.state.units.kinds[field.quantity][1] : 1);
@@ -29,11 +35,12 @@ const id = (field) => `field-${field.key.replace(/[^\w]+/g, '-')}`;
 const number = (value, by) => String(Number((value / by).toPrecision(7)));
 
 function row(field) {
-  const name = id(field), about = { id: name, 'aria-describedby': `${name}-problem`, onchange: (event) => put(field, event.target) };
+  const name = id(field), about = { id: name, 'aria-describedby': `${name}-problem ${name}-help`, title: field.help, onchange: (event) => put(field, event.target) };
   const input = field.kind === 'choice'
     ? el('select', about, ...field.choices.map((c) => el('option', { value: c }, c)))
     : el('input', { ...about, type: field.kind === 'number' ? 'number' : 'text', step: 'any', autocomplete: 'off' });
   return el('div', { class: 'row' }, el('label', { for: name }, field.label), input, el('span', { class: 'unit' }, unit(field)),
+    el('span', { id: `${name}-help`, hidden: true }, field.help || ''),
     el('p', { class: 'problem', id: `${name}-problem`, role: 'alert', hidden: true }));
 }
 

@@ -28,6 +28,7 @@ export function startMap() {
   byId('zoom-all').addEventListener('click', fit);
   DARK.addEventListener('change', () => { shown = ''; if (known.state) dress(known.state); });
   on('state', (state) => {
+    map.resize(); // the panel beside it may have changed
     dress(state);
     const whole = JSON.stringify([state.stage === 'empty', state.terrain && state.terrain.bounds, state.name]);
     if (whole === fitted || !state.bounds) return;
@@ -99,7 +100,7 @@ function coloured(layer) {
   if (layer.id === 'shade') layer.paint = {
     'hillshade-exaggeration': 0.55, 'hillshade-illumination-direction': 315,
     'hillshade-shadow-color': dark ? '#05070a' : '#4a3a28', 'hillshade-accent-color': dark ? '#0c1116' : '#7a6a55',
-    'hillshade-highlight-color': dark ? '#5b6672' : '#ffffff',
+    'hillshade-highlight-color': dark ? '#8d9aa8' : '#ffffff',
   };
   if (layer.id === 'base') layer.paint = { 'raster-opacity': dark ? 0.55 : 0.85, 'raster-fade-duration': 0 };
   return layer;

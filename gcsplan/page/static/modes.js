@@ -73,5 +73,5 @@ export function startModes() {
     if (wanted.dataset.mode === modeNow()) leave(); else enter(wanted.dataset.mode);
     canvas().focus({ preventScroll: true });
   });
-  on('state', (state) => { byId('draw').hidden = state.stage !== 'mission'; });
+  on('state', (state) => { for (const id of ['draw', 'legend']) byId(id).hidden = state.stage !== 'mission'; });
 }

@@ -10,7 +10,10 @@ let shown = null, vehicle = 0, at = -1, plot = null, cursor = null, range = null
 
 export function startProfile() {
   on('judged', draw);
-  on('state', (state) => { if (state.stage !== 'mission') draw(null); });
+  on('state', (state) => {
+    if (state.stage !== 'mission' || !byId('below').children.length) draw(null);
+    byId('below').hidden = state.stage === 'empty';
+  });
   let scheduled = null;
   frame().addEventListener('pointermove', (event) => {
     if (!scheduled) requestAnimationFrame(() => { const e = scheduled; scheduled = null; overMap(e); });
@@ -25,9 +28,8 @@ function draw(plan) {
   hideTip();
   pointed(null);
   const flights = plan ? plan.vehicles.filter((v) => v.profile && v.profile.distance_m.length > 1) : [];
-  box.hidden = !flights.length;
   shown = null;
-  if (!flights.length) return;
+  if (!flights.length) { box.replaceChildren(el('p', { class: 'note' }, 'The profile along the path appears with the first mission.')); return; }
   box.classList.remove('old');
   const one = flights.find((v) => v.vehicle === vehicle) || flights[0];
   shown = one.profile;
@@ -91,7 +93,7 @@ function chart(p) {
     class: 'view plot', tabindex: 0, role: 'slider', 'aria-label': 'Place along the path', 'aria-valuemin': 0, 'aria-valuemax': Math.round(end), 'aria-valuenow': 0,
     onpointermove: overPlot, onpointerdown: overPlot, onpointerleave: () => point(-1), onkeydown: key, onblur: () => point(-1),
   }, svg('svg', { viewBox: `0 0 ${ALL} ${ALL}`, preserveAspectRatio: 'none', 'aria-hidden': 'true' }, grids, ...shapes, cursor));
-  return el('figure', { class: 'chart' }, el('div', { class: 'ylabel' }, `${height[0]} above sea level`), yticks, plot, xticks,
+  return el('figure', { class: 'chart' }, el('div', { class: 'ylabel' }, height[0]), yticks, plot, xticks,
     el('div', { class: 'foot' }, legend(p), el('span', { class: 'xlabel' }, `along the path, ${far[0]}`)));
 }
 
@@ -120,7 +122,7 @@ function legend(p) {
 function point(i, event) {
   at = i;
   if (!shown) return;
-  if (i < 0) { pointed(null); cursor.setAttribute('d', ''); hideTip(); return; }
+  if (i < 0 || byId('below').classList.contains('old')) { pointed(null); cursor.setAttribute('d', ''); hideTip(); return; }
   pointed([shown.lat[i], shown.lon[i]]);
   cursor.setAttribute('d', `M${(ALL * shown.distance_m[i]) / range.end} 0V${ALL}`);
   const rows = rowsOf(i);
@@ -147,7 +149,7 @@ function overPlot(event) {
 }
 
 function overMap(event) {
-  if (!event || !shown || holding() || byId('below').classList.contains('old')) { if (at >= 0 && holding()) point(-1); return; }
+  if (!event || !shown || holding()) { if (at >= 0) point(-1); return; }
   const box = canvas().getBoundingClientRect(), x = event.clientX - box.left, y = event.clientY - box.top;
   let best = NEAR_PX, found = -1;
   for (let i = 0; i < shown.lat.length; i++) {

@@ -15,12 +15,13 @@ export function startResult() {
   on('path', path);
   on('bound', (message) => showGap(message.gap_percent));
   on('plan', plan);
+  on('home', home);
   on('refused', refused);
-  on('asked', () => verdict('unjudged', '…', 'Planning', 'The mission is planned and judged.'));
+  on('asked', planning);
   on('error', (message) => { if (message.code === 'bad_mission') nothing(message.message, 'The mission has a mistake'); });
   on('connection', (now) => { if (now !== 'open') verdict('unjudged', '…', 'Not connected', 'The result below may be old.'); });
   on('state', (state) => {
-    if (state.stage === 'mission') return;
+    if (state.stage === 'mission') { if (!known.plan) planning(); return; }
     clearPath();
     drawNoHome([]);
     markPlace(null);
@@ -32,6 +33,8 @@ export function startResult() {
   });
   return box;
 }
+
+const planning = () => verdict('unjudged', '…', 'Planning', 'The mission is planned and judged.');
 
 function verdict(look, sign, word, words) {
   const made = byId('verdict') || box.querySelector('.verdict');
@@ -80,11 +83,29 @@ function plan(message) {
 }
 
 function ofVehicle(v, many) {
-  const rows = v.figures.filter((f) => f.key !== 'verdict').map((f) => el('div', { class: f.bad ? 'bad' : null, 'data-key': f.key },
-    el('dt', {}, f.label), el('dd', {}, f.at ? button(f.text, () => { goTo(f.at); markPlace(f.at, f.label); }, { class: 'spot', title: 'Show the place on the map' }) : f.text)));
+  const rows = v.figures.filter((f) => f.key !== 'verdict').map(figure);
+  if (!v.way_home) rows.push(el('div', { 'data-home': v.vehicle }, el('dt', {}, 'Way home'), el('dd', {}, 'being judged')));
   const list = (name, items, open) => (items.length ? el('details', { open }, el('summary', {}, `${name} (${items.length})`), el('ul', {}, ...items.map((i) => el('li', {}, i)))) : null);
   return [many ? el('h3', {}, v.name) : null, el('dl', {}, ...rows), list('Findings', v.findings, true),
-    v.way_home && v.way_home.unsafe.length ? el('p', { class: 'bare bad' }, v.way_home.text) : null, list('Notes', v.notes, false)].filter((p) => p);
+    homeWords(v.vehicle, v.way_home), list('Notes', v.notes, false)].filter((p) => p);
+}
+
+function figure(f) {
+  return el('div', { class: f.bad ? 'bad' : null, 'data-key': f.key }, el('dt', {}, f.label),
+    el('dd', {}, f.at ? button(f.text, () => { goTo(f.at); markPlace(f.at, f.label); }, { class: 'spot', title: 'Show the place on the map' }) : f.text));
+}
+
+// -- the way home: its judgement comes after the mission's ------------------------------------------------------------
+
+const homeWords = (vehicle, way) => el('p', { class: `bare${way && way.unsafe.length ? ' bad' : ''}`, id: `home-${vehicle}`, hidden: !way || way.safe === true || !way.text }, way ? way.text : '');
+
+function home(message) {
+  drawNoHome(message.vehicles.flatMap((v) => (v.way_home ? v.way_home.unsafe : [])));
+  for (const v of message.vehicles) {
+    const row = box.querySelector(`[data-home="${v.vehicle}"]`);
+    if (row && v.figure) row.replaceWith(figure(v.figure)); else row?.remove();
+    if (v.way_home) byId(`home-${v.vehicle}`)?.replaceWith(homeWords(v.vehicle, v.way_home));
+  }
 }
 
 // -- no mission -------------------------------------------------------------------------------------------------------

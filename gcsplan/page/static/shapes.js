@@ -44,29 +44,34 @@ function drawZones(features) {
   names.replaceChildren();
   layers.zones.replaceChildren(...features.map((feature) => {
     const { name, levels, kind, key } = feature.properties, lines = rings(feature.geometry);
-    const at = centre(lines[0]), made = el('div', { class: 'mark name' }, el('b', {}, levels ? `${name}\n${levels}` : name));
+    const at = centre(lines[0]), made = el('div', { class: 'mark name' }, el('b', {}, name));
     names.append(made);
-    labels.push({ made, at, ring: lines[0], w: 0, h: 0 });
+    labels.push({ made, at, ring: lines[0], name, full: levels ? `${name}\n${levels}` : name, sizes: [] });
     const shape = svg('path', {
       class: kind === 'keep_in' ? 'area' : 'zone', 'data-key': key, 'data-name': name, d: lines.map((line) => d(line, true)).join(''),
     });
     shape.append(svg('title', {}, levels ? `${name}: ${levels}` : name));
     return shape;
   }));
-  for (const label of labels) [label.w, label.h] = [label.made.firstChild.offsetWidth, label.made.firstChild.offsetHeight];
+  for (const label of labels) label.sizes.push(measured(label));
+  for (const label of labels) label.made.firstChild.textContent = label.full;
+  for (const label of labels) label.sizes.push(measured(label));
 }
+
+const measured = ({ made }) => [made.firstChild.offsetWidth, made.firstChild.offsetHeight];
 
 const centre = (ring) => {
   const lat = ring.map((p) => p[0]), lon = ring.map((p) => p[1]);
   return [0.5 * (Math.min(...lat) + Math.max(...lat)), 0.5 * (Math.min(...lon) + Math.max(...lon))];
 };
 
-// Names stand in their zones, the widest zones first, where there is room; the levels only where the zone is large.
+// Names stand in their zones, the widest zones first, where there is room; the levels only where the zone is as wide.
 function layNames() {
   const [width, height] = size();
   const things = labels.map((label) => {
     const [x, y] = pixel(label.at), xs = label.ring.map((p) => pixel(p)[0]), wide = Math.max(...xs) - Math.min(...xs);
-    return { label, x, y, r: 0, w: label.w, h: label.h, inside: true, wide };
+    const long = label.sizes[1][0] < 1.1 * wide, [w, h] = label.sizes[long ? 1 : 0];
+    return { label, x, y, r: 0, w, h, inside: true, wide, long };
   }).sort((a, b) => b.wide - a.wide);
   const points = [...document.querySelectorAll('.point')].map((made) => made.getBoundingClientRect());
   const box = frame().getBoundingClientRect();
@@ -75,6 +80,7 @@ function layNames() {
     const { label, x, y } = things[i];
     label.made.classList.toggle('mute', !spot || things[i].wide < 8);
     if (!spot) return;
+    label.made.firstChild.textContent = things[i].long ? label.full : label.name;
     const b = label.made.firstChild.style;
     b.left = `${spot[0] - x}px`;
     b.top = `${spot[1] - y}px`;

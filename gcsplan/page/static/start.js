@@ -1,19 +1,19 @@
 // Start from nothing: the ground, the vehicle and the legal ceiling are chosen; then start and goal are clicked.
 import { button, byId, el, refill } from './dom.js';
-import { known, on } from './hub.js';
+import { on } from './hub.js';
 import { send, step } from './link.js';
 import { canvas, goTo } from './map.js';
 import { enter } from './modes.js';
 
 const PRESETS = [['copter', 'Copter, ArduPilot'], ['wing', 'Fixed wing, ArduPilot'], ['px4', 'Copter, PX4']];
-const OFTEN_M = 120;
+const OFTEN = { m: 120, ft: 400 }; // the ceiling above ground that most laws have
 const CLOSE = 13; // zoom at which a place is shown that was typed
 
-let form = null, asking = 0, draft = null;
+let form = null, asking = 0, draft = null, symbol = 'm', unit_m = 1;
 
 export function startFromNothing(panel) {
   on('state', (state) => {
-    if (state.stage === 'empty' && !form) show(panel, state);
+    if (state.stage === 'empty' && (!form || symbol !== state.units.kinds.height[0])) show(panel, state);
     if (state.stage !== 'empty') form = null;
     if (state.stage === 'draft' && draft !== state.name) { draft = state.name; begin(state); }
     if (state.stage === 'mission') draft = null;
@@ -36,6 +36,7 @@ const radio = (group, value, words, on) => el('label', { class: 'choice' },
   el('input', { type: 'radio', name: group, value, onchange: on }), el('span', {}, words));
 
 function show(panel, state) {
+  [symbol, unit_m] = state.units.kinds.height;
   const files = state.files.length
     ? el('select', { id: 'start-file', 'aria-label': 'Terrain file', onchange: () => pick('ground', 'file') }, ...state.files.map((f) => el('option', {}, f))) : null;
   form = el('form', { id: 'start', onsubmit: submit, novalidate: true },
@@ -43,13 +44,13 @@ function show(panel, state) {
     el('p', { class: 'note' }, 'Choose, then click start and goal on the map. Nothing leaves this machine.'),
     el('fieldset', {}, el('legend', {}, 'Ground'),
       radio('ground', 'sample', 'Sample: Jacksboro, Tennessee'),
-      el('div', { class: 'with' }, radio('ground', 'flat', 'Flat, at'), number('start-flat', '0', 'Height of the flat ground, m above sea level', 'ground', 'flat'), el('span', {}, 'm above sea level')),
+      el('div', { class: 'with' }, radio('ground', 'flat', 'Flat, at'), number('start-flat', '0', `Height of the flat ground, ${symbol} above sea level`, 'ground', 'flat'), el('span', {}, `${symbol} above the sea`)),
       files ? el('div', { class: 'with' }, radio('ground', 'file', 'File'), files)
         : el('p', { class: 'note' }, 'A terrain file (.tif, .vrt, .hgt, .asc) in the folder of the mission appears here.'),
       problem('ground')),
     el('fieldset', {}, el('legend', {}, 'Vehicle'), ...PRESETS.map(([value, words]) => radio('preset', value, words)), problem('preset')),
     el('fieldset', {}, el('legend', {}, 'Legal ceiling above ground'),
-      el('div', { class: 'with' }, radio('ceiling', 'metres', 'At most'), number('start-ceiling', String(OFTEN_M), 'Legal ceiling, m above ground', 'ceiling', 'metres'), el('span', {}, 'm')),
+      el('div', { class: 'with' }, radio('ceiling', 'metres', 'At most'), number('start-ceiling', String(OFTEN[symbol] || OFTEN.m), `Legal ceiling, ${symbol} above ground`, 'ceiling', 'metres'), el('span', {}, symbol)),
       radio('ceiling', 'none', 'None applies'), problem('ceiling')),
     el('details', {}, el('summary', {}, 'Show a place first'),
       el('div', { class: 'with' }, el('input', { id: 'start-place', type: 'text', 'aria-label': 'Place', 'aria-describedby': 'start-place-problem', placeholder: '36.6175, -84.3892', autocomplete: 'off', onkeydown: enterFinds }),
@@ -90,13 +91,12 @@ function found(at) {
 function submit(event) {
   event.preventDefault();
   const chosen = (name) => (form.querySelector(`[name=${name}]:checked`) || {}).value;
-  const ground = chosen('ground'), ceiling = chosen('ceiling'), metres = Number(byId('start-ceiling').value);
+  const ground = chosen('ground'), ceiling = chosen('ceiling'), metres = Number((Number(byId('start-ceiling').value) * unit_m).toPrecision(12));
   const height = byId('start-flat').value;
   complain('ground', !ground ? 'Choose the ground: it is never assumed.' : ground === 'flat' && height === '' ? 'Give the height of the flat ground.' : '');
-  complain('ceiling', !ceiling ? 'Choose: the law of the place decides, often 120 m.' : ceiling === 'metres' && !(metres > 0) ? 'Give a height above 0 m.' : '');
+  complain('ceiling', !ceiling ? 'Choose: the law of the place decides.' : ceiling === 'metres' && !(metres > 0) ? 'Give a height above 0.' : '');
   const wrong = form.querySelector('.problem:not([hidden])');
   if (wrong) { const field = wrong.closest('fieldset, details').querySelector('input'); field.focus(); return; }
-  const terrain = { sample: { dem: 'sample:jacksboro' }, flat: { flat_m: Number(height) }, file: { dem: (byId('start-file') || {}).value } }[ground];
-  known.wanted = true;
+  const terrain = { sample: { dem: 'sample:jacksboro' }, flat: { flat_m: Number((Number(height) * unit_m).toPrecision(12)) }, file: { dem: (byId('start-file') || {}).value } }[ground];
   step({ type: 'new', terrain, preset: chosen('preset'), max_agl_m: ceiling === 'none' ? null : metres, min_agl_m: Math.min(60, ceiling === 'none' ? 60 : metres / 2), start: null, goal: null });
 }

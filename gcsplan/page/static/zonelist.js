@@ -6,14 +6,14 @@ import { goTo } from './map.js';
 import { chosenZone, remove, select } from './zones.js';
 import { zones } from './shapes.js';
 
-const LEVELS = [['', 'none'], ['agl_m', 'm above ground'], ['amsl_m', 'm above sea level']];
+const LEVELS = [['agl', 'above ground'], ['amsl', 'above sea level']];
 let box = null, open = false;
 
 export function startZoneList() {
   box = el('section', { id: 'zones', 'aria-label': 'Zones' });
   on('state', show);
-  on('chosen', () => {
-    if (chosenZone()) open = true;
+  on('chosen', (key) => {
+    if (key) open = true;
     show();
     const editor = box.querySelector('.editor');
     if (editor && matchMedia('(min-width: 800px)').matches) editor.scrollIntoView({ block: 'nearest' });
@@ -52,15 +52,18 @@ function editor(z) {
 
 // A floor or a ceiling: a number and what it counts from. Without a floor a zone begins at the ground; without a ceiling it has no top.
 function level(z, which) {
-  const [key, value] = Object.entries(z[which] || {})[0] || [`${which}_`, ''], from = key.slice(which.length + 1);
+  const [key, value] = Object.entries(z[which] || {})[0] || ['', ''], [, from, own] = key.split('_');
+  const unit = own || known.state.units.kinds.height[0];
   const input = el('input', { id: `zone-${which}`, type: 'number', step: 'any', value, 'aria-label': `${which}, number`, onchange: put });
-  const kind = el('select', { id: `zone-${which}-from`, 'aria-label': `${which}, counted from`, onchange: put }, ...LEVELS.map(([v, words]) => el('option', { value: v, selected: v === from }, words)));
+  const kind = el('select', { id: `zone-${which}-from`, 'aria-label': `${which}, counted from`, onchange: put }, el('option', { value: '' }, 'none'),
+    ...LEVELS.map(([v, words]) => el('option', { value: v, selected: v === from }, `${unit} ${words}`)));
   function put(event) {
-    if (event.target === input && kind.value === '') kind.value = 'agl_m';
+    if (event.target === input && kind.value === '') kind.value = 'agl';
     if (kind.value !== '' && input.value === '') { input.focus(); return; }
-    const changes = { [`${z.key}.${which}_agl_m`]: null, [`${z.key}.${which}_amsl_m`]: null };
-    if (kind.value) changes[`${z.key}.${which}_${kind.value}`] = Number(input.value);
-    change(changes);
+    const now = kind.value ? `${which}_${kind.value}_${unit}` : '', changes = {};
+    if (key && key !== now) changes[`${z.key}.${key}`] = null;
+    if (now) changes[`${z.key}.${now}`] = Number(input.value);
+    if (Object.keys(changes).length) change(changes);
   }
   return el('div', { class: 'row' }, el('label', { for: `zone-${which}` }, which === 'floor' ? 'Floor' : 'Ceiling'), input, kind);
 }
