@@ -378,7 +378,9 @@ def _climbing(trials: Trials, path: Floats) -> Cure:
     raised = [(key, was) for key, was in (("max_climb_deg", up), ("max_descent_deg", down)) if was < found.value]
     would = " and ".join(f"{key} {found.value:g}" for key, _ in raised)
     was = " and ".join(f"{was:g}" for was in dict.fromkeys(was for _, was in raised))
-    return Cure(f"{would} would do {found.words(f'{was} is given')}", sets=tuple((key, found.value) for key, _ in raised))
+    return Cure(
+        f"{would} would do {found.words(f'{was} is given')}", sets=tuple((key, found.value) for key, _ in raised)
+    )
 
 
 def _steepest_deg(problem: Problem) -> float:
@@ -400,7 +402,9 @@ def _above_ground(trials: Trials, path: Floats) -> Cure:
     found = trials.least("max_agl_m", lambda m: _limited(problem, max_agl_m=m), given, enough, values)
     if found.path is None:
         return Cure(f"without max_agl_m there is a path{found.no_value}")
-    return Cure(f"max_agl_m {found.value:g} would do {found.words(f'{given:g} is given')}", sets=(("max_agl_m", found.value),))
+    return Cure(
+        f"max_agl_m {found.value:g} would do {found.words(f'{given:g} is given')}", sets=(("max_agl_m", found.value),)
+    )
 
 
 def _fewer_zones(trials: Trials, path: Floats) -> Cure:
