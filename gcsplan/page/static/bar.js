@@ -33,8 +33,8 @@ function shortcut(event) {
 }
 
 function state(now) {
-  byId('title').textContent = now.stage === 'empty' ? 'gcsplan map' : now.name;
-  document.title = now.stage === 'empty' ? 'gcsplan map' : `${now.saved ? '' : '• '}${now.name} – gcsplan map`;
+  byId('title').textContent = now.stage === 'empty' ? 'gcsplan map' : now.name || 'New mission';
+  document.title = now.stage === 'empty' ? 'gcsplan map' : `${now.saved ? '' : '• '}${now.name || 'New mission'} – gcsplan map`;
   byId('undo').disabled = !now.undo;
   byId('redo').disabled = !now.redo;
   const button_ = byId('save');

@@ -55,6 +55,7 @@ export function step(message) {
   asked = 0;
   known.busy = open();
   const n = send(message);
+  known.n = Math.max(known.n, n); // answers to what was before it come too late
   if (n) tell('asked', n);
   return n;
 }
@@ -62,6 +63,7 @@ export function step(message) {
 // Changes keys while something is dragged: the newest change goes out in the next frame, one at a time.
 export function live(changes) {
   waiting = changes;
+  tell('dragged', changes);
   pump();
 }
 

@@ -6,7 +6,7 @@ import { banner, startBar } from './bar.js';
 import { startFromNothing } from './start.js';
 import { startGrips } from './grips.js';
 import { startLimits } from './limits.js';
-import { startMap } from './map.js';
+import { showState, startMap } from './map.js';
 import { startModes } from './modes.js';
 import { startPlaces } from './places.js';
 import { startProfile } from './profile.js';
@@ -33,6 +33,7 @@ function start() {
   const panel = byId('panel'), parts = [startResult(), startPlaces(), startZoneList(), startLimits()];
   on('state', (state) => { if (state.stage !== 'empty' && !panel.contains(parts[0])) panel.replaceChildren(...parts); });
   startFromNothing(panel);
+  showState();
   connect();
   on('state', () => { document.documentElement.dataset.ready = 'yes'; });
 }

@@ -6,7 +6,7 @@ const DETAIL = 16; // shapes are drawn in pixels of this zoom, from their origin
 const DARK = matchMedia('(prefers-color-scheme: dark)');
 const NO_GROUND = { type: 'background', id: 'paper', paint: {} };
 
-let map = null, origin = null, shown = '', fitted = '';
+let map = null, origin = null, shown = '', fitted = '', touched = false;
 
 export function startMap() {
   map = new maplibregl.Map({
@@ -22,20 +22,27 @@ export function startMap() {
   map.on('move', () => tell('moved'));
   map.on('resize', () => tell('moved'));
   map.on('moveend', () => tell('rested'));
+  for (const kind of ['dragstart', 'zoomstart']) map.on(kind, (event) => { touched = touched || Boolean(event.originalEvent); });
+  on('plan', () => { if (!touched) fit(); touched = true; }); // the first path may lead out of the picture
   map.on('error', () => {}); // a tile beside the terrain is absent, which is no error
   byId('zoom-in').addEventListener('click', () => map.zoomIn({ duration: 150 }));
   byId('zoom-out').addEventListener('click', () => map.zoomOut({ duration: 150 }));
   byId('zoom-all').addEventListener('click', fit);
   DARK.addEventListener('change', () => { shown = ''; if (known.state) dress(known.state); });
+  return map;
+}
+
+// Listens last: the other parts of the page have their sizes by then.
+export function showState() {
   on('state', (state) => {
     map.resize(); // the panel beside it may have changed
     dress(state);
     const whole = JSON.stringify([state.stage === 'empty', state.terrain && state.terrain.bounds, state.name]);
     if (whole === fitted || !state.bounds) return;
     fitted = whole;
+    touched = false;
     fit();
   });
-  return map;
 }
 
 export const frame = () => map.getCanvasContainer();
@@ -64,7 +71,15 @@ export const size = () => [map.getCanvas().clientWidth, map.getCanvas().clientHe
 
 export function fit() {
   const { bounds } = known.state;
-  if (bounds) map.fitBounds([[bounds[0], bounds[1]], [bounds[2], bounds[3]]], { padding: Math.min(48, size()[0] / 9), animate: false });
+  if (!bounds) return;
+  let [west, south, east, north] = bounds;
+  for (const { line } of known.state.stage === 'mission' && known.plan ? known.plan.vehicles : []) {
+    for (let i = 0; i + 2 < line.length; i += 3) {
+      [south, north] = [Math.min(south, line[i]), Math.max(north, line[i])];
+      [west, east] = [Math.min(west, line[i + 1]), Math.max(east, line[i + 1])];
+    }
+  }
+  map.fitBounds([[west, south], [east, north]], { padding: { top: 40, bottom: 40, left: Math.min(130, size()[0] / 6), right: 56 }, animate: false });
 }
 export function goTo(place, zoom) {
   map.jumpTo({ center: [place[1], place[0]], zoom: zoom || map.getZoom() });

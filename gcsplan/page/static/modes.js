@@ -49,7 +49,7 @@ export function startModes() {
   let pressed = null;
   box.addEventListener('pointerdown', (event) => {
     pressed = [event.clientX, event.clientY];
-    if (!current || !current.press || event.button !== 0 || event.target.closest('.point')) return;
+    if (!current || !current.press || event.button !== 0) return;
     event.preventDefault();
     current.press(event, placeAt(event));
   });

@@ -7,7 +7,9 @@ import { goTo } from './map.js';
 import { agePath, clearPath, drawNoHome, drawPath, markPlace } from './shapes.js';
 
 const LOOK = { safe: ['safe', '✓'], violations: ['unsafe', '✕'], 'not judged': ['unjudged', '?'] };
-let box = null, gap = null;
+let box = null;
+let current = null; // the plan that is shown as the verdict on the mission as it is now
+let before = []; // the answers of the newest mission: a change that is refused as a whole brings them back
 
 export function startResult() {
   box = el('section', { id: 'result', 'aria-label': 'Result' },
@@ -17,9 +19,13 @@ export function startResult() {
   on('plan', plan);
   on('home', home);
   on('refused', refused);
-  on('asked', planning);
-  on('error', (message) => { if (message.code === 'bad_mission') nothing(message.message, 'The mission has a mistake'); });
-  on('connection', (now) => { if (now !== 'open') verdict('unjudged', '…', 'Not connected', 'The result below may be old.'); });
+  on('asked', () => { current = null; planning(); });
+  on('dragged', () => { if (current) { agePath(); follows(); } });
+  on('error', (message) => {
+    if (message.code === 'bad_mission') nothing(message.message, 'The mission has a mistake');
+    if (message.code === 'bad_change') for (const answer of before) ({ plan, home, refused })[answer.type](answer);
+  });
+  on('connection', (now) => { if (now !== 'open') current = null; if (now !== 'open') verdict('unjudged', '…', 'Not connected', 'The result below may be old.'); });
   on('state', (state) => {
     if (state.stage === 'mission') { if (!known.plan) planning(); return; }
     clearPath();
@@ -44,22 +50,27 @@ function verdict(look, sign, word, words) {
 
 function showGap(percent) {
   const made = box.querySelector('#gap');
-  gap = percent;
   made.hidden = percent === null || percent === undefined;
   if (made.hidden) return;
   const text = `No path is more than ${num(percent, percent < 0.095 ? 2 : 1)}${'\u202f'}% shorter`;
   made.replaceChildren(el('span', {}, text), el('meter', { min: 0, max: 20, low: 1, value: Math.min(20, percent), 'aria-label': 'Gap, percent' }));
 }
 
+function follows() {
+  current = null;
+  showGap(null);
+  verdict('unjudged', '…', 'A path follows', 'It is not judged yet: release the point.');
+}
+
 function path(message) {
+  current = null;
   drawPath(message.vehicle, message.line, 'draft');
   drawNoHome([]);
   markPlace(null);
   byId('below').classList.add('old');
   box.querySelector('#rest').classList.add('old');
   if (message.live || holding()) {
-    showGap(null);
-    verdict('unjudged', '…', 'A path follows', 'It is not judged yet: release the point.');
+    follows();
   } else {
     showGap(message.gap_percent);
     verdict('unjudged', '…', 'A path is found', 'The bound tightens; the mission is not judged yet.');
@@ -67,6 +78,8 @@ function path(message) {
 }
 
 function plan(message) {
+  current = message;
+  before = [message];
   clearPath();
   const look = LOOK[message.verdict] || LOOK['not judged'];
   for (const v of message.vehicles) {
@@ -78,17 +91,19 @@ function plan(message) {
   showGap(null);
   const rest = box.querySelector('#rest');
   rest.classList.remove('old');
-  rest.replaceChildren(...message.vehicles.flatMap((v) => ofVehicle(v, message.vehicles.length > 1)));
+  rest.replaceChildren(...message.vehicles.flatMap((v) => ofVehicle(v, message.vehicles.length > 1)),
+    ...[list('Left out', (message.left_out || []).map((l) => `${l.name}: ${l.message}`), true), list('Notes on all', message.notes || [], false)].filter((p) => p));
   tell('judged', message);
 }
 
 function ofVehicle(v, many) {
   const rows = v.figures.filter((f) => f.key !== 'verdict').map(figure);
   if (!v.way_home) rows.push(el('div', { 'data-home': v.vehicle }, el('dt', {}, 'Way home'), el('dd', {}, 'being judged')));
-  const list = (name, items, open) => (items.length ? el('details', { open }, el('summary', {}, `${name} (${items.length})`), el('ul', {}, ...items.map((i) => el('li', {}, i)))) : null);
-  return [many ? el('h3', {}, v.name) : null, el('dl', {}, ...rows), list('Findings', v.findings, true),
+  return [many ? el('h3', {}, v.name) : null, el('dl', {}, ...rows), list('Findings', v.findings, true), list('Not judged', v.not_judged || [], true),
     homeWords(v.vehicle, v.way_home), list('Notes', v.notes, false)].filter((p) => p);
 }
+
+const list = (name, items, open) => (items.length ? el('details', { open }, el('summary', {}, `${name} (${items.length})`), el('ul', {}, ...items.map((i) => el('li', {}, i)))) : null);
 
 function figure(f) {
   return el('div', { class: f.bad ? 'bad' : null, 'data-key': f.key }, el('dt', {}, f.label),
@@ -100,6 +115,9 @@ function figure(f) {
 const homeWords = (vehicle, way) => el('p', { class: `bare${way && way.unsafe.length ? ' bad' : ''}`, id: `home-${vehicle}`, hidden: !way || way.safe === true || !way.text }, way ? way.text : '');
 
 function home(message) {
+  if (!current || current.n !== message.n) return;
+  before = [current, message];
+  if (message.headline) verdict(...LOOK[current.verdict] || LOOK['not judged'], current.verdict, message.headline);
   drawNoHome(message.vehicles.flatMap((v) => (v.way_home ? v.way_home.unsafe : [])));
   for (const v of message.vehicles) {
     const row = box.querySelector(`[data-home="${v.vehicle}"]`);
@@ -111,6 +129,7 @@ function home(message) {
 // -- no mission -------------------------------------------------------------------------------------------------------
 
 function nothing(words, word) {
+  current = null;
   agePath();
   drawNoHome([]);
   byId('below').classList.add('old');
@@ -120,6 +139,7 @@ function nothing(words, word) {
 }
 
 function refused(message) {
+  if (!message.live) before = [message];
   nothing(message.message, message.live ? 'No path here' : 'No mission');
   markPlace(message.at, message.zone || 'here');
   if (message.live) return;

@@ -72,13 +72,13 @@ function pressCircle(event, centre) {
   };
   const end = () => {
     window.removeEventListener('pointermove', move);
-    window.removeEventListener('pointerup', end);
+    for (const kind of ['pointerup', 'pointercancel']) window.removeEventListener(kind, end);
     if (radius_m / perPixel(centre) < 4) { sketch(null); return; }
     add({ center: centre, radius_m });
     leave();
   };
   window.addEventListener('pointermove', move);
-  window.addEventListener('pointerup', end);
+  for (const kind of ['pointerup', 'pointercancel']) window.addEventListener(kind, end);
 }
 
 // Without a drag, by Enter on the map: a circle of an eighth of the map's width, to be changed at its grips.

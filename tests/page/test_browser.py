@@ -1,0 +1,230 @@
+"""The page of `gcsplan map` in a real browser: clicked, dragged, typed, saved; no error, no request that leaves."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+for extra in ("starlette", "uvicorn", "websockets", "maplibre.sources"):
+    pytest.importorskip(extra.partition(".")[0], reason="the extra map is not installed")
+
+from gcsplan.app.api import write
+from gcsplan.app.session import Planner
+from gcsplan.cli.command_table import app
+from gcsplan.page.server import MapServer
+from tests.page.browser_hand import Hand
+from tests.page.talk import FLAT, eventually, serving
+from tests.support import browser as chromium
+from tests.support.browser import Browser
+
+PROGRAM = chromium.find()
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.xdist_group("map"),
+    pytest.mark.skipif(
+        PROGRAM is None,
+        reason=f"no browser: none of {', '.join(chromium.NAMES)} is installed (GCSPLAN_CHROMIUM names one)",
+    ),
+]
+ON_MAP = "#map-frame canvas"
+GOAL, START = "#grip-0-goal", "#grip-0-start"
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    assert PROGRAM is not None
+    with chromium.browser(PROGRAM, tmp_path_factory.mktemp("home")) as made:
+        yield made
+
+
+@pytest.fixture
+def field(tmp_path: Path) -> Path:
+    (tmp_path / "field.yaml").write_text(FLAT, encoding="utf-8")
+    return tmp_path / "field.yaml"
+
+
+@pytest.fixture
+def server(field: Path) -> Iterator[MapServer]:
+    with serving(field, field.parent) as server:
+        yield server
+
+
+@pytest.fixture
+def hand(page: Browser, server: MapServer) -> Hand:
+    page.visit(server.url)
+    made = Hand(page)
+    made.judged()
+    return made
+
+
+def value(page: Browser, selector: str) -> str:
+    return str(page.evaluate(f"document.querySelector({json.dumps(selector)}).value"))
+
+
+def stays_here(page: Browser, server: MapServer) -> bool:
+    """Whether every request of the page went to its server, and nothing was reported."""
+    assert page.complaints() == []
+    return all(url.removeprefix("blob:").startswith(f"http://127.0.0.1:{server.port}/") for url in page.requests())
+
+
+def test_a_dragged_goal_is_followed_by_a_path_and_judged_on_release(hand: Hand, server: MapServer) -> None:
+    page, (x, y), before = hand.page, hand.at(GOAL), value(hand.page, "#place-0-goal")
+    solid = page.evaluate("document.getElementById('path').getAttribute('d')")
+    hand.press(x, y)
+    hand.mouse("mouseMoved", x - 60, y + 40, down=True)
+    hand.until("document.getElementById('path').classList.contains('draft')")
+    assert hand.verdict() == "A path follows"  # never "safe" before it is judged
+    assert value(page, "#place-0-goal") == before  # the mission has not changed
+    hand.mouse("mouseReleased", x - 60, y + 40)
+    hand.judged()
+    assert page.evaluate("document.getElementById('path').getAttribute('class')") == "track t0 judged"
+    assert page.evaluate("document.getElementById('path').getAttribute('d')") != solid
+    assert value(page, "#place-0-goal") != before
+    assert not page.evaluate("document.getElementById('undo').disabled")
+    assert stays_here(page, server)
+
+
+@pytest.mark.nightly
+def test_a_mission_by_mouse_alone_has_the_bytes_of_the_command_line(page: Browser, tmp_path: Path) -> None:
+    with serving(None, tmp_path) as server:
+        page.visit(server.url)
+        hand = Hand(page)
+        hand.click("#begin")  # nothing is assumed: the page requests both choices
+        assert page.evaluate("document.querySelectorAll('.problem:not([hidden])').length") == 2
+        for choice in ("[value=sample]", "[value=metres]", "#begin"):
+            hand.click(choice)
+        hand.until("document.body.classList.contains('placing')")
+        x, y = hand.at(ON_MAP)
+        for place in ((x - 90, y + 20), (x + 60, y - 30)):
+            hand.click(place)
+            page.settle()
+            hand.until("document.querySelectorAll('.grips .point').length > 0")
+        hand.judged()
+        hand.click("[data-mode=circle]")
+        hand.drag([(x - 20, y + 5), (x - 12, y + 5), (x - 4, y + 5)])
+        hand.until("document.querySelector('#zone-name')")
+        hand.judged()
+        hand.click("#save")
+        hand.click("#ask .main")
+        hand.until("document.getElementById('save').textContent === 'Saved'")
+        assert stays_here(page, server)
+        shown = json.loads(page.evaluate("JSON.stringify([...document.querySelectorAll('#rest dd')].map((e) => e.innerText))"))
+    file = next(tmp_path.glob("*.yaml"))
+    assert CliRunner().invoke(app, ["plan", str(file), "-o", str(tmp_path / "there")]).exit_code == 0
+    planned = Planner(file).plan()
+    write(planned, tmp_path / "here")
+    names = sorted(f.name for f in (tmp_path / "here").iterdir() if f.is_file())
+    assert all((tmp_path / "here" / n).read_bytes() == (tmp_path / "there" / n).read_bytes() for n in names)
+    assert any(f"{planned.vehicles[0].verdict.length_m:.0f}" in text.replace("\u202f", "") for text in shown)
+
+
+@pytest.mark.nightly
+def test_everything_is_done_by_the_keyboard_too(hand: Hand) -> None:
+    page = hand.page
+    before = value(page, "#place-0-goal")
+    page.evaluate(f"document.querySelector('{GOAL}').focus()")
+    hand.key("ArrowLeft")
+    hand.key("ArrowUp")
+    hand.until(f"document.querySelector('#place-0-goal').value !== '{before}'")
+    assert page.evaluate("document.activeElement.id") == GOAL[1:]  # the focus stays with the point
+    hand.judged()
+    hand.key("z", control=True)
+    hand.until(f"document.querySelector('#place-0-goal').value === '{before}'")
+    hand.judged()
+    page.evaluate("document.querySelector('[data-mode=via]').focus()")
+    hand.key("Enter")
+    hand.key("Enter")  # on the map, whose focus shows a cross in its middle
+    hand.until("document.getElementById('grip-0-via-0')")
+    hand.judged()
+    page.evaluate("document.getElementById('grip-0-via-0').focus()")
+    hand.key("Delete")
+    hand.until("!document.getElementById('grip-0-via-0')")
+    hand.judged()
+    hand.write("#place-0-goal", "46°30'36\"N 8°30'18\"E")
+    hand.until("document.querySelector('#place-0-goal').value.startsWith('46.51')")
+    hand.judged()
+    assert page.evaluate("[...document.querySelectorAll('button, input, select, [role=slider]')].filter((e) => e.offsetParent"
+                         " && !(e.ariaLabel || e.labels?.length || e.innerText.trim())).map((e) => e.outerHTML)") == []  # fmt: skip
+    assert page.complaints() == []
+
+
+@pytest.mark.nightly
+def test_zones_are_drawn_changed_and_deleted(hand: Hand, field: Path) -> None:
+    page, (x, y) = hand.page, hand.at(ON_MAP)
+    hand.click("[data-mode=polygon]")
+    for place in ((x + 150, y + 60), (x + 220, y + 60), (x + 200, y + 130)):
+        hand.click(place)
+        page.settle()
+    hand.click("#finish")
+    hand.until("document.querySelector('#zone-name')?.value === 'zone 1'")
+    hand.judged()
+    corner = hand.at("#zone-corner-0")
+    hand.drag([corner, (corner[0] - 20, corner[1] - 10), (corner[0] - 30, corner[1] - 20)])
+    hand.judged()
+    hand.write("#zone-ceiling", "80")
+    hand.until("document.querySelector('.list .chosen small').textContent.includes('80')")
+    hand.judged()
+    page.evaluate("document.querySelector('#zone-half-0').focus()")
+    hand.key("ArrowUp")
+    hand.until("document.querySelector('#zone-corner-3')")
+    hand.judged()
+    hand.key("s", control=True)
+    assert eventually(lambda: "zone 1" in field.read_text(encoding="utf-8"))
+    text = field.read_text(encoding="utf-8")
+    assert "ceiling_agl_m: 80" in text
+    assert "# the mast" in text  # comments stay
+    hand.click("#zone-delete")
+    hand.until("!document.querySelector('#zone-name')")
+    hand.judged()
+    assert page.complaints() == []
+
+
+@pytest.mark.nightly
+def test_without_a_mission_the_place_is_shown_and_a_cure_is_a_button(page: Browser, field: Path) -> None:
+    wall = FLAT.replace("limits: {min_agl_m: 30}", "limits: {min_agl_m: 30, max_agl_m: 60}").replace(
+        "{name: mast, center: [46.505, 8.5], radius_m: 150}",
+        "{name: wall, polygon: [[46.504, 8.40], [46.506, 8.40], [46.506, 8.60], [46.504, 8.60]], ceiling_agl_m: 80}",
+    )
+    field.write_text(wall, encoding="utf-8")
+    with serving(field, field.parent) as server:
+        page.visit(server.url)
+        hand = Hand(page)
+        hand.until("document.querySelector('#verdict.unsafe')")
+        assert len(page.evaluate("document.querySelector('#verdict p').textContent")) > 20
+        hand.click(".cure button")
+        hand.judged()
+        assert stays_here(page, server)
+
+
+@pytest.mark.nightly
+def test_a_change_on_disk_and_a_lost_server_are_said(page: Browser, field: Path) -> None:
+    with serving(field, field.parent) as server:
+        page.visit(server.url)
+        hand = Hand(page)
+        hand.judged()
+        field.write_text(FLAT.replace("name: field", "name: changed"), encoding="utf-8")
+        hand.until("document.querySelector('.banner')?.innerText.includes('changed on disk')")
+        hand.click(".banner button")
+        hand.until("document.getElementById('title').textContent === 'changed'")
+        hand.judged()
+        assert page.complaints() == []
+    hand.until("document.querySelector('.banner')?.innerText.includes('connection')")
+    assert hand.verdict() == "Not connected"
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize(("width", "dark"), [(1200, True), (390, False), (390, True)], ids=["dark", "phone", "dark-phone"])
+def test_the_page_fits_a_phone_and_a_dark_room(page: Browser, server: MapServer, width: int, dark: bool) -> None:
+    page.visit(server.url, width=width, height=844, dark=dark, phone=width < 500)
+    hand = Hand(page)
+    hand.judged()
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    assert page.evaluate("[...document.querySelectorAll('button, select')].filter((e) => e.offsetParent && e.offsetHeight < 20 "
+                         "&& !e.classList.contains('spot')).map((e) => e.outerHTML)") == []  # fmt: skip
+    paper = page.evaluate("getComputedStyle(document.body).backgroundColor")
+    assert (paper == "rgb(20, 24, 29)") == dark
+    assert stays_here(page, server)
