@@ -123,17 +123,17 @@ class Edits:
         if self.planner is None:
             self._change_draft(changes)
             return
-        before = self.planner.mission
         for place, value in changes.items():
             if place.endswith(".via"):
                 number = int(place[len("vehicles[") : place.index("]")])
-                vehicles = before.get("vehicles") or []
+                vehicles = self.planner.mission.get("vehicles") or []
                 old = vehicles[number].get("via") if number < len(vehicles) else None
                 changes[place] = with_heights(old, value)
         if live:
             self._live |= changes
             return
         self._live.clear()
+        before = self.planner.mission
         self.planner.change(changes)
         if self.planner.mission != before:
             self._history.step(before)

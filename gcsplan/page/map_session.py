@@ -70,6 +70,7 @@ class MapSession:
         self._costs: dict[str, float] = {}
         self._problems: tuple[Mistake, ...] = ()
         self._zones = KeptWorld()
+        self._names: list[str] = []
         self._revision = 0
         self._tiles: GroundTiles | None = None
         self._tiles_of: Any = None
@@ -231,7 +232,7 @@ class MapSession:
         self._begun_s = time.monotonic()
         begun_s = time.perf_counter()
         seen: set[str] = set()
-        names = [str(v.get("name")) for v in planner.mission.get("vehicles") or [] if isinstance(v, dict)]
+        names = self._names
 
         def on_path(found: BetterPath) -> None:
             if live and found.vehicle in seen:
@@ -300,6 +301,7 @@ class MapSession:
         frame = _frame_of(document)
         self._find_tiles(document, frame)
         vehicles = vehicles_of(document, frame)
+        self._names = [v["name"] for v in vehicles]
         where = str(edits.store.place)
         entries: dict[str, Any] = {}
         with suppress(InputError):

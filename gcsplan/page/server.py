@@ -272,6 +272,7 @@ def _bound(port: int) -> socket.socket:
         else:
             made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         made.bind((HOST, port))
+        made.listen(MOST_CONNECTIONS)  # a page that is opened before the server runs waits for it
     except (OSError, OverflowError) as why:
         made.close()
         taken = isinstance(why, OSError) and why.errno in (errno.EADDRINUSE, errno.EACCES)

@@ -1,0 +1,194 @@
+"""The server of `gcsplan map`: time from a pointer's message to the path, from the release to the certificate; memory.
+
+The page is a plain client of the WebSocket here: what a browser takes to draw is apart from it.
+"""
+
+from __future__ import annotations
+
+import gc
+import json
+import math
+import tempfile
+import time
+import tracemalloc
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from gcsplan.bench.sample import SAMPLE_HALF_M, SAMPLE_MIDDLE_DEG, SAMPLE_TERRAIN
+from gcsplan.bench.session import SESSION_ZONES, degree_terrain, drawn_mission
+from gcsplan.units import METRIC
+from gcsplan.world.geodesy.frame import Frame
+
+PLACES = 50
+"""Places over which one drag leads the goal."""
+
+STEP_M = 60.0
+"""Metres between two of them: some pixels of the map, as a pointer moves."""
+
+MANY_ZONES = 200
+ANSWER_S = 60.0
+GOAL = "vehicles[0].goal"
+
+
+def run(drags: int = 8, moves: int = 0, seed: int = 1, *, degree: bool = True) -> dict[str, Any]:
+    """Measure ``drags`` of the goal on the sample with few and many zones and on a tile of one degree, and the memory
+    that ``moves`` take (0: not measured)."""
+    result: dict[str, Any] = {"drags": drags, "places": PLACES, "seed": seed}
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        for zones in (SESSION_ZONES, MANY_ZONES):
+            rng = np.random.default_rng(seed)
+            mission = drawn_mission(SAMPLE_TERRAIN, SAMPLE_MIDDLE_DEG, SAMPLE_HALF_M, rng, zones)
+            with _page(mission, folder) as page:
+                result[f"zones_{zones}"] = _measured(page, SAMPLE_MIDDLE_DEG, drags, rng)
+        if degree:
+            rng = np.random.default_rng(seed)
+            middle = (46.5, 8.5)
+            mission = drawn_mission(_written(degree_terrain(rng), folder), middle, (20_000.0, 20_000.0), rng)
+            with _page(mission, folder) as page:
+                result["degree"] = _measured(page, middle, drags, rng)
+        if moves:
+            rng = np.random.default_rng(seed)
+            mission = drawn_mission(SAMPLE_TERRAIN, SAMPLE_MIDDLE_DEG, SAMPLE_HALF_M, rng)
+            with _page(mission, folder) as page:
+                result["memory"] = _memory(page, SAMPLE_MIDDLE_DEG, moves, rng)
+    return result
+
+
+def report(result: dict[str, Any]) -> str:
+    """The figures in lines."""
+    lines = []
+    for key in (f"zones_{SESSION_ZONES}", f"zones_{MANY_ZONES}", "degree"):
+        if key in result:
+            one = result[key]
+            path = f"p50 {one['path_p50_ms']:.0f} ms, p90 {one['path_p90_ms']:.0f} ms"
+            plan = f"p50 {one['plan_p50_ms']:.0f} ms, p90 {one['plan_p90_ms']:.0f} ms"
+            counts = f"{one['paths']} paths, {one['refused']} refused, {one['plans']} plans"
+            lines.append(f"{key.replace('_', ' ')}: pointer to path {path}; release to certificate {plan}; {counts}")
+    if "memory" in result:
+        memory = result["memory"]
+        grown = f"{memory['grown_bytes'] / 1e3:+.0f} kB of Python's"
+        lines.append(f"memory: {grown}, resident {memory['resident_grown_bytes'] / 1e6:+.1f} MB in {memory['moves']} moves")
+    return "\n".join(lines)
+
+
+class _Client:
+    """One page: sends messages, and waits for answers to the newest one."""
+
+    def __init__(self, socket: Any) -> None:
+        self._socket, self._n = socket, 0
+
+    def ask(self, kind: str, *until: str, **more: Any) -> dict[str, Any]:
+        """Send a message; the first answer to it of one of the kinds ``until``."""
+        self._n += 1
+        self._socket.send(json.dumps({"type": kind, "n": self._n, **more}))
+        while True:
+            answer: dict[str, Any] = json.loads(self._socket.recv(timeout=ANSWER_S))
+            if answer["type"] in until and answer["n"] == self._n:
+                return answer
+
+
+@contextmanager
+def _page(mission: dict[str, Any], folder: Path) -> Iterator[_Client]:
+    """A server of the mission, and a page that has its first certificate."""
+    from websockets.sync.client import connect
+
+    from gcsplan.page.edits import Edits
+    from gcsplan.page.map_session import MapSession
+    from gcsplan.page.server import HOST, MapServer
+
+    file = folder / "bench.yaml"
+    file.write_text(yaml.safe_dump(mission), encoding="utf-8")
+    session = MapSession(Edits.of_file(file), METRIC)
+    server = MapServer(session)
+    server.start()
+    origin = {"Origin": f"http://{HOST}:{server.port}"}
+    url = server.url.replace("http://", "ws://") + "socket"
+    try:
+        with connect(url, additional_headers=origin, compression=None, max_size=None, proxy=None) as socket:
+            page = _Client(socket)
+            page.ask("hello", "plan", "refused", "error")
+            yield page
+    finally:
+        server.stop()
+        session.close()
+
+
+def _drag(middle: tuple[float, float], rng: np.random.Generator, places: int) -> list[list[float]]:
+    """Places of the goal along a bent line around the middle."""
+    frame, turn, far_m = Frame(*middle), rng.uniform(0.0, 2.0 * math.pi), rng.uniform(3_000.0, 9_000.0)
+    angles = turn + np.arange(places) * STEP_M / far_m
+    degrees = frame.to_degrees(far_m * np.cos(angles), far_m * np.sin(angles))
+    return [[round(float(lat), 6), round(float(lon), 6)] for lat, lon in degrees]
+
+
+def _measured(
+    page: _Client, middle: tuple[float, float], drags: int, rng: np.random.Generator
+) -> dict[str, Any]:
+    """Milliseconds by the clock, over the socket, from each place to its path, and from each release to the plan."""
+    paths, plans, refused = [], [], 0
+    for drag in range(drags + 1):
+        places = _drag(middle, rng, PLACES)
+        for place in places:
+            begun_s = time.perf_counter()
+            answer = page.ask("change", "path", "refused", "error", changes={GOAL: place}, live=True)
+            if answer["type"] != "path":
+                refused += 1
+            elif drag:  # the first drag warms up
+                paths.append((time.perf_counter() - begun_s) * 1e3)
+        begun_s = time.perf_counter()
+        answer = page.ask("change", "plan", "refused", "error", changes={GOAL: places[-1]})
+        if answer["type"] == "plan" and drag:
+            plans.append((time.perf_counter() - begun_s) * 1e3)
+        page.ask("units", "home", "refused", "error", units="metric")
+    return {
+        "paths": len(paths), "refused": refused, "plans": len(plans),
+        **{f"path_p{q}_ms": float(np.quantile(paths, q / 100)) for q in (50, 90)},
+        **{f"plan_p{q}_ms": float(np.quantile(plans, q / 100)) for q in (50, 90)},
+    }  # fmt: skip
+
+
+def _memory(page: _Client, middle: tuple[float, float], moves: int, rng: np.random.Generator) -> dict[str, Any]:
+    """Bytes that the server holds more after many moves than after the first hundred."""
+
+    def move(count: int) -> None:
+        for k, place in enumerate(_drag(middle, rng, count)):
+            page.ask("change", "path", "refused", "error", "plan", changes={GOAL: place}, live=bool((k + 1) % PLACES))
+
+    move(2 * PLACES)
+    gc.collect()
+    tracemalloc.start()
+    before, resident = tracemalloc.get_traced_memory()[0], _resident_bytes()
+    move(moves)
+    gc.collect()
+    grown = tracemalloc.get_traced_memory()[0] - before
+    tracemalloc.stop()
+    return {"moves": moves, "grown_bytes": grown, "resident_grown_bytes": _resident_bytes() - resident}
+
+
+def _resident_bytes() -> int:
+    """Resident memory of this process; 0 where the system does not say."""
+    try:
+        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+    except (OSError, ValueError):
+        return 0
+    return pages * 4096
+
+
+def _written(terrain: dict[str, Any], folder: Path) -> dict[str, Any]:
+    """The terrain as a file of the folder, as a mission file names it."""
+    import rasterio
+    from rasterio.transform import Affine
+
+    heights, (a, b, c, d, e, f) = terrain["dem"], terrain["transform"]
+    with rasterio.open(
+        folder / "degree.tif", "w", driver="GTiff", width=heights.shape[1], height=heights.shape[0], count=1,
+        dtype="float32", crs=terrain["crs"], transform=Affine(a, b, c, d, e, f), tiled=True,
+    ) as file:  # fmt: skip
+        file.write(heights, 1)
+    return {"dem": "degree.tif", "vertical_datum": terrain["vertical_datum"]}
