@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -130,8 +131,10 @@ def refused_answer(n: int, why: NoMission, document: Document, units: Units, *, 
 
 def error_answer(n: int, why: GcsplanError, code: str) -> dict[str, Any]:
     """An error in words."""
-    first = why.problems[0].where if isinstance(why, InputError) else why.where
-    return {"type": "error", "n": n, "code": code, "message": str(why), "where": first.rpartition(": ")[2]}
+    problems = why.problems if isinstance(why, InputError) else ()
+    where = problems[0].where.rpartition(": ")[2] if problems else ""
+    words = [str(replace(p, where=p.where.rpartition(": ")[2])) for p in problems[:MOST_LISTED]]
+    return {"type": "error", "n": n, "code": code, "message": "\n".join(words) or str(why), "where": where}
 
 
 def figures(v: VehiclePlan, home: WayHome | None, units: Units) -> list[dict[str, Any]]:

@@ -116,8 +116,16 @@ def _field(form: FormKey, document: Document, problems: Sequence[Mistake]) -> di
         "kind": "choice" if choices else "text" if form.key == "name" else "number",
         "quantity": None if other else form.quantity, "unit": unit, "value": section.get(name),
         "default": default if isinstance(default, int | float | str) else None, "choices": choices,
-        "error": next((p.message for p in problems if p.where.rpartition(": ")[2] == place), None),
+        "error": next((p.message for p in problems if _is_at(p.where.rpartition(": ")[2], place)), None),
     }  # fmt: skip
+
+
+def _is_at(where: str, place: str) -> bool:
+    """Whether a mistake belongs to a field; one of a vehicle's limits is that of the limit of all."""
+    section, _, name = place.rpartition(".")
+    return where == place or (
+        section == "limits" and re.fullmatch(r"vehicles\[\d+\]", where.removesuffix(f".{name}")) is not None
+    )
 
 
 def _section(document: Document, place: str) -> dict[str, Any]:

@@ -31,7 +31,7 @@ class History:
         return bool(self._next)
 
     def step(self, before: Document) -> None:
-        """Note that ``before`` was changed; what was undone is forgotten."""
+        """Note that ``before`` was changed; the steps that were undone are forgotten."""
         self._next.clear()
         self._past.append(_packed(before))
         while len(self._past) > MOST_STEPS or sum(map(len, self._past)) > MOST_BYTES:

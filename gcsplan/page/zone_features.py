@@ -1,4 +1,4 @@
-"""The zones of a mission's document as GeoJSON for the map, those with mistakes elsewhere too."""
+"""The zones of a mission's document as GeoJSON for the map, whatever is wrong elsewhere in it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The map's session: edits, undo, live paths, certificates, refusals with cures, the file and what is kept beside it."""
+"""The map's session: edits, undo, live paths, certificates, refusals with cures, the file, and unsaved edits."""
 
 from __future__ import annotations
 
@@ -107,7 +107,11 @@ def test_a_page_gets_the_state_then_the_certificate_then_the_way_home(desk: Desk
 def test_the_certificate_is_that_of_the_command_line(desk: Desk, file: Path) -> None:
     found = desk.ask("hello", "plan")["vehicles"][0]
     [own] = plan(load_mission(file)).vehicles
-    assert (found["length_m"], found["bound"], found["cost"]) == (own.verdict.length_m, own.solution.lower_bound, own.cost)
+    assert (found["length_m"], found["bound"], found["cost"]) == (
+        own.verdict.length_m,
+        own.solution.lower_bound,
+        own.cost,
+    )
     assert found["line"][:2] == [46.5, 8.5]
 
 
@@ -160,11 +164,11 @@ def test_a_goal_in_a_zone_is_refused_with_its_place(desk: Desk) -> None:
 
 def test_a_limit_that_leaves_no_path_is_refused_with_a_cure_that_does(desk: Desk) -> None:
     desk.ask("hello", "plan")
-    refused = desk.ask("change", "refused", changes={"limits.max_agl_m": 31})
+    refused = desk.ask("change", "refused", changes={"limits.max_amsl_m": 130})
     assert (refused["reason"], refused["vehicle"]) == ("infeasible", "uav1")
     assert refused["at"] == pytest.approx([46.5, 8.5], abs=1e-4)
     [cure] = refused["cures"]
-    assert list(cure["changes"]) == ["limits.max_agl_m"]
+    assert list(cure["changes"]) == ["limits.max_amsl_m"]
     assert desk.ask("change", "plan", changes=cure["changes"])["verdict"] == "safe"
 
 
@@ -174,6 +178,9 @@ def test_a_wrong_number_stands_at_its_field(desk: Desk) -> None:
     form = next(a for a in reversed(desk.heard) if a["type"] == "state")["form"]
     assert "must be at least 0" in next(f["error"] for f in form if f["key"] == "limits.min_agl_m")
     assert desk.ask("change", "state", changes={"limits.min_agl_m": 40})["problems"] == []
+    assert "write 51 or more" in desk.ask("change", "error", changes={"limits.max_agl_m": 41})["message"]
+    form = next(a for a in reversed(desk.heard) if a["type"] == "state")["form"]
+    assert "write 51 or more" in next(f["error"] for f in form if f["key"] == "limits.max_agl_m")
 
 
 def test_a_save_keeps_the_comments_and_plans_the_same_by_the_command_line(desk: Desk, file: Path) -> None:
@@ -312,7 +319,12 @@ def test_a_limit_in_feet_is_changed_in_feet(file: Path) -> None:
     file.write_text(FLAT.replace("min_agl_m: 30", "min_agl_ft: 100"))
     with desk_of(file, file.parent) as desk:
         field = next(f for f in desk.ask("hello", "state")["form"] if f["key"].startswith("limits.min_agl"))
-        assert (field["key"], field["unit"], field["value"], field["quantity"]) == ("limits.min_agl_ft", "ft", 100, None)
+        assert (field["key"], field["unit"], field["value"], field["quantity"]) == (
+            "limits.min_agl_ft",
+            "ft",
+            100,
+            None,
+        )
         desk.ask("change", "plan", changes={"limits.min_agl_ft": 120})
         desk.ask("save", "saved")
     assert "min_agl_ft: 120" in file.read_text()

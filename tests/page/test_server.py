@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -37,8 +38,8 @@ def server(folder: Path) -> Iterator[MapServer]:
 
 
 def test_the_page_and_its_parts_are_served_with_a_strict_policy(server: MapServer) -> None:
-    for path, kind in (("", "text/html"), ("lib/maplibre-gl.js", "text/javascript"), ("lib/maplibre-gl.css", "text/css"),
-                       ("report/report.css", "text/css")):  # fmt: skip
+    script = "text/javascript"
+    for path, kind in (("", "text/html"), ("lib/maplibre-gl.js", script), ("report/report.css", "text/css")):
         status, headers, body = get(server, path)
         assert (status, headers["content-type"].partition(";")[0]) == (200, kind), path
         assert body
@@ -168,16 +169,19 @@ def test_keys_that_name_files_or_links_cannot_be_changed(server: MapServer) -> N
 
 
 def test_a_message_that_is_too_large_closes_the_socket(server: MapServer) -> None:
-    with Page(server) as page, pytest.raises(ConnectionClosed):
+    with Page(server) as page:
         page.socket.send('{"type":"hello","n":1,"x":"' + "a" * 300_000 + '"}')
-        page.until("state")
+        with pytest.raises(ConnectionClosed):
+            page.until("state")
 
 
 def test_a_flood_closes_the_socket_and_the_server_goes_on(server: MapServer) -> None:
-    with Page(server) as page, pytest.raises(ConnectionClosed):
-        for _ in range(3000):
-            page.send("place", text="46.5, 8.5")
-        page.until("never")
+    with Page(server) as page:
+        with suppress(ConnectionClosed):
+            for _ in range(3000):
+                page.send("place", text="46.5, 8.5")
+        with pytest.raises(ConnectionClosed):
+            page.until("never")
     with Page(server) as page:
         page.send("hello")
         assert page.until("state")["stage"] == "mission"

@@ -43,7 +43,7 @@ def map_(
     from gcsplan.page.server import MapServer, files_served
     from gcsplan.units import units_of
 
-    files_served()  # what is missing is found before the mission is read
+    files_served()  # before the mission is read: the extra may be missing
     below = None if base is None else BaseMap(base)
     edits = Edits.of_folder(Path()) if mission is None else Edits.of_file(mission)
     session = MapSession(edits, units_of(units.value), None if below is None else below.as_dict())

@@ -93,13 +93,14 @@ class _Writing:
         """The value of the key ``name`` changes from ``old`` to ``new``."""
         if isinstance(node, yaml.MappingNode) and isinstance(old, dict) and isinstance(new, dict) and node.value:
             return self.mapping(node, old, new)
-        if isinstance(node, yaml.SequenceNode) and not node.flow_style and isinstance(old, list) and isinstance(new, list):
+        lists = isinstance(old, list) and isinstance(new, list)
+        if isinstance(node, yaml.SequenceNode) and lists and not node.flow_style:
             mark = len(self.spans)
             if self._entries(node, old, new):
                 return True
             del self.spans[mark:]
         if (
-            isinstance(node, yaml.SequenceNode) and isinstance(old, list) and isinstance(new, list)
+            isinstance(node, yaml.SequenceNode) and lists
             and 0 < len(old) <= len(new) and all(_alike(a, b) for a, b in zip(old, new, strict=False))
         ):  # fmt: skip
             return self._sequence(node, old, new)

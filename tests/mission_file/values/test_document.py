@@ -40,8 +40,11 @@ vehicles:
         ("a: |\n  text\nb: 1\n", {"a": "text\n", "b": 1, "c": 2}, "a: |\n  text\nb: 1\nc: 2\n"),
         ("a:\n  - 1  # one\n  - 2\n# end\n", {"a": [2]}, "a:\n  - 2\n# end\n"),
         ("a:\n- {b: 1}\n- b: 2\n  c: 3\n- 4", {"a": [{"b": 1}, 4]}, "a:\n- {b: 1}\n- 4"),
-        ("a:\n- {name: xx}\n- {name: yy, b: 1}  # y\n", {"a": [{"name": "yy", "c": 2}, {"name": "zz"}]},
-         "a:\n- {name: yy, c: 2}  # y\n- {name: zz}\n"),
+        (
+            "a:\n- {name: xx}\n- {name: yy, b: 1}  # y\n",
+            {"a": [{"name": "yy", "c": 2}, {"name": "zz"}]},
+            "a:\n- {name: yy, c: 2}  # y\n- {name: zz}\n",
+        ),
         ("a:\n- {name: xx}  # x\n", {"a": [{"name": "zz", "b": 1}]}, "a:\n- {name: zz, b: 1}  # x\n"),
         ("a:\n- {name: xx, b: 1, c: 2}  # x\n", {"a": [{"name": "xx", "d": 1}]}, "a:\n- {name: xx, d: 1}  # x\n"),
         ("a:\n- 1\n- 2  # two\n", {"a": [1, 3]}, "a:\n- 1\n- 3\n"),
