@@ -9,7 +9,7 @@ from typing import Any
 
 from tests.support.browser import Browser
 
-PATIENCE_S = 60.0
+PATIENCE_S = 25.0
 CODES = {
     "Enter": 13, "Escape": 27, "Delete": 46, "Tab": 9, "ArrowLeft": 37, "ArrowUp": 38, "ArrowRight": 39, "ArrowDown": 40
 }  # fmt: skip
@@ -23,7 +23,8 @@ class Hand:
         self.page = page
 
     def until(self, script: str, seconds: float = PATIENCE_S) -> Any:
-        """The value of a script as soon as it is true."""
+        """The value of a script as soon as it is true; true for an element."""
+        script = f"((found) => (found instanceof Node ? true : found))({script})"
         end_s = time.monotonic() + seconds
         while not (value := self.page.evaluate(script)):
             assert time.monotonic() < end_s, f"never true: {script}; {self.verdict()}; {self.said()}"
@@ -92,6 +93,8 @@ class Hand:
 
     def write(self, selector: str, text: str) -> None:
         """Text in place of a field's own, and Enter."""
-        self.page.evaluate(f"(() => {{ const e = document.querySelector({json.dumps(selector)}); e.focus(); e.select(); }})()")
+        self.page.evaluate(
+            f"(() => {{ const e = document.querySelector({json.dumps(selector)}); e.focus(); e.select(); }})()"
+        )
         self.page.ask("Input.insertText", text=text)
         self.key("Enter")

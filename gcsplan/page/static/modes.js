@@ -35,13 +35,18 @@ export function leave() {
 export function show() {
   const hint = byId('hint');
   hint.hidden = !current;
-  byId('cross').hidden = !current || document.activeElement !== canvas();
+  cross();
   for (const each of document.querySelectorAll('#draw [data-mode]')) {
     each.setAttribute('aria-pressed', String(each.dataset.mode === modeNow()));
   }
   if (!current) return;
   const words = typeof current.hint === 'function' ? current.hint() : current.hint;
   refill(hint, el('span', {}, words), ...(current.buttons ? current.buttons() : []), button('Stop', leave, { id: 'stop', title: 'Escape' }));
+}
+
+// A cross shows where Enter puts a point. (Anew with each focus, unlike the hint: its buttons must outlive a press on them.)
+function cross() {
+  byId('cross').hidden = !current || document.activeElement !== canvas();
 }
 
 export function startModes() {
@@ -65,7 +70,7 @@ export function startModes() {
     event.preventDefault();
     current.click(middle(), true);
   });
-  for (const when of ['focus', 'blur']) canvas().addEventListener(when, show);
+  for (const when of ['focus', 'blur']) canvas().addEventListener(when, cross);
   document.addEventListener('keydown', (event) => { if (event.key === 'Escape' && current) leave(); });
   byId('draw').addEventListener('click', (event) => {
     const wanted = event.target.closest('[data-mode]');
