@@ -24,21 +24,21 @@ from gcsplan.bench.session import SESSION_ZONES, degree_terrain, drawn_mission
 from gcsplan.units import METRIC
 from gcsplan.world.geodesy.frame import Frame
 
-PLACES = 50
+DRAG_PLACES = 50
 """Places over which one drag leads the goal."""
 
-STEP_M = 60.0
+DRAG_STEP_M = 60.0
 """Metres between two of them: some pixels of the map, as a pointer moves."""
 
 MANY_ZONES = 200
-ANSWER_S = 60.0
+PAGE_ANSWER_S = 60.0
 GOAL = "vehicles[0].goal"
 
 
 def run(drags: int = 8, moves: int = 0, seed: int = 1, *, degree: bool = True) -> dict[str, Any]:
     """Measure ``drags`` of the goal on the sample with few and many zones and on a tile of one degree, and the memory
     that ``moves`` take (0: not measured)."""
-    result: dict[str, Any] = {"drags": drags, "places": PLACES, "seed": seed}
+    result: dict[str, Any] = {"drags": drags, "places": DRAG_PLACES, "seed": seed}
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         for zones in (SESSION_ZONES, MANY_ZONES):
@@ -96,7 +96,7 @@ class _Client:
         self._n += 1
         self._socket.send(json.dumps({"type": kind, "n": self._n, **more}))
         while True:
-            answer: dict[str, Any] = json.loads(self._socket.recv(timeout=ANSWER_S))
+            answer: dict[str, Any] = json.loads(self._socket.recv(timeout=PAGE_ANSWER_S))
             if answer["type"] in until and answer["n"] == self._n:
                 return answer
 
@@ -130,7 +130,7 @@ def _page(mission: dict[str, Any], folder: Path) -> Iterator[_Client]:
 def _drag(middle: tuple[float, float], rng: np.random.Generator, places: int) -> list[list[float]]:
     """Places of the goal along a bent line around the middle."""
     frame, turn, far_m = Frame(*middle), rng.uniform(0.0, 2.0 * math.pi), rng.uniform(3_000.0, 9_000.0)
-    angles = turn + np.arange(places) * STEP_M / far_m
+    angles = turn + np.arange(places) * DRAG_STEP_M / far_m
     degrees = frame.to_degrees(far_m * np.cos(angles), far_m * np.sin(angles))
     return [[round(float(lat), 6), round(float(lon), 6)] for lat, lon in degrees]
 
@@ -140,7 +140,7 @@ def _measured(page: _Client, middle: tuple[float, float], drags: int, rng: np.ra
     of the processor, which server and page together take."""
     paths, plans, refused = _Times(), _Times(), 0
     for drag in range(drags + 1):
-        places = _drag(middle, rng, PLACES)
+        places = _drag(middle, rng, DRAG_PLACES)
         for place in places:
             paths.begin()
             answer = page.ask("change", "path", "refused", "error", changes={GOAL: place}, live=True)
@@ -187,9 +187,11 @@ def _memory(page: _Client, middle: tuple[float, float], moves: int, rng: np.rand
 
     def move(count: int) -> None:
         for k, place in enumerate(_drag(middle, rng, count)):
-            page.ask("change", "path", "refused", "error", "plan", changes={GOAL: place}, live=bool((k + 1) % PLACES))
+            page.ask(
+                "change", "path", "refused", "error", "plan", changes={GOAL: place}, live=bool((k + 1) % DRAG_PLACES)
+            )
 
-    move(2 * PLACES)
+    move(2 * DRAG_PLACES)
     gc.collect()
     tracemalloc.start()
     before, resident = tracemalloc.get_traced_memory()[0], _resident_bytes()

@@ -19,7 +19,7 @@ from gcsplan.check.verdict import LegFigures, Verdict
 from gcsplan.errors import GcsplanError, InputError, NoMission
 from gcsplan.notes.note import Wording
 from gcsplan.page.form import cure_changes
-from gcsplan.page.history import Document
+from gcsplan.page.history import EditedDocument
 from gcsplan.report.parts.track_samples import TrackLine, line_of
 from gcsplan.units import Joules, Quantity, Seconds, Units, in_units
 from gcsplan.world.geodesy.frame import Frame
@@ -27,7 +27,7 @@ from gcsplan.world.geodesy.frame import Frame
 PROFILE_SAMPLES = 400
 """Samples of a profile; a few more if there are many legs."""
 
-MOST_LISTED = 50
+MOST_ON_PAGE = 50
 """Most findings and most notes of one vehicle."""
 
 PLACE_DECIMALS, HEIGHT_DECIMALS = 7, 2
@@ -64,7 +64,7 @@ def plan_answer(n: int, plan: Plan, homes: Mapping[str, WayHome], units: Units, 
         "elapsed_ms": round(elapsed_s * 1e3, 1),
         "vehicles": [_vehicle(k, v, plan, homes.get(v.name), units) for k, v in enumerate(plan.vehicles)],
         "left_out": [{"name": left.name, "message": left.message} for left in plan.left_out],
-        "notes": notes[:MOST_LISTED],
+        "notes": notes[:MOST_ON_PAGE],
     }  # fmt: skip
 
 
@@ -82,7 +82,7 @@ def _flies(v: VehiclePlan, plan: Plan, home: WayHome | None) -> bool | None:
 def _headline(plan: Plan, homes: Mapping[str, WayHome], wording: Wording) -> str:
     """The verdict of the only vehicle, or of each."""
     words = [(v.name, verdict_words(v.verdict.safe, homes.get(v.name)).text(wording)) for v in plan.vehicles]
-    return words[0][1] if len(words) == 1 else "; ".join(f"{name}: {text}" for name, text in words[:MOST_LISTED])
+    return words[0][1] if len(words) == 1 else "; ".join(f"{name}: {text}" for name, text in words[:MOST_ON_PAGE])
 
 
 def _vehicle(number: int, v: VehiclePlan, plan: Plan, home: WayHome | None, units: Units) -> dict[str, Any]:
@@ -96,9 +96,9 @@ def _vehicle(number: int, v: VehiclePlan, plan: Plan, home: WayHome | None, unit
         "figures": figures(v, home, units),
         "way_home": None if home is None or line is None else _way_home(home, line, plan.world.frame, wording),
         "profile": None if line is None else _profile(line, plan.world.frame),
-        "findings": [f.note.text(wording) for f in verdict.findings[:MOST_LISTED]],
-        "not_judged": [note.text(wording) for note in verdict.not_judged[:MOST_LISTED]],
-        "notes": notes[:MOST_LISTED],
+        "findings": [f.note.text(wording) for f in verdict.findings[:MOST_ON_PAGE]],
+        "not_judged": [note.text(wording) for note in verdict.not_judged[:MOST_ON_PAGE]],
+        "notes": notes[:MOST_ON_PAGE],
     }  # fmt: skip
 
 
@@ -117,7 +117,7 @@ def home_answer(n: int, plan: Plan, homes: Mapping[str, WayHome], units: Units) 
     return {"type": "home", "n": n, "headline": _headline(plan, homes, wording), "vehicles": vehicles}
 
 
-def refused_answer(n: int, why: NoMission, document: Document, units: Units, *, live: bool) -> dict[str, Any]:
+def refused_answer(n: int, why: NoMission, document: EditedDocument, units: Units, *, live: bool) -> dict[str, Any]:
     """No mission: the reason, the place that binds, and limits that would do, each as a change to send back."""
     cures = []
     for cure in why.cures:
@@ -133,7 +133,7 @@ def error_answer(n: int, why: GcsplanError, code: str) -> dict[str, Any]:
     """An error in words."""
     problems = why.problems if isinstance(why, InputError) else ()
     where = problems[0].where.rpartition(": ")[2] if problems else ""
-    words = [str(replace(p, where=p.where.rpartition(": ")[2])) for p in problems[:MOST_LISTED]]
+    words = [str(replace(p, where=p.where.rpartition(": ")[2])) for p in problems[:MOST_ON_PAGE]]
     return {"type": "error", "n": n, "code": code, "message": "\n".join(words) or str(why), "where": where}
 
 
@@ -186,7 +186,7 @@ def _way_home(home: WayHome, line: TrackLine, frame: Frame, wording: Wording) ->
         places = np.vstack([np.array([s.start[:2]]), between.reshape(-1, 2), np.array([s.end[:2]])])
         unsafe.append(np.round(places, PLACE_DECIMALS).ravel().tolist())
     rows = [{"label": row.label, "text": row.note.text(wording)} for row in home.rows()]
-    return {"safe": home.safe, "unsafe": unsafe, "text": home.headline.text(wording), "rows": rows[:MOST_LISTED]}
+    return {"safe": home.safe, "unsafe": unsafe, "text": home.headline.text(wording), "rows": rows[:MOST_ON_PAGE]}
 
 
 def _profile(line: TrackLine, frame: Frame) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from gcsplan.errors import InputError, UsageError
 FORMATS = {"png": "image/png", "jpg": "image/jpeg", "jpeg": "image/jpeg", "webp": "image/webp"}
 """Formats of an MBTiles file that are served, by the word in its metadata."""
 
-MOST_TILE_BYTES = 4 * 2**20
+MOST_BASE_TILE_BYTES = 4 * 2**20
 
 _ADDRESS = re.compile(r"(https?://[A-Za-z0-9.-]+(?::\d+)?)/[^\s'\";,]*")
 
@@ -70,4 +70,4 @@ class BaseMap:
             except (sqlite3.Error, OverflowError):
                 return None
         data = row[0] if row is not None else None
-        return data if isinstance(data, bytes) and len(data) <= MOST_TILE_BYTES else None
+        return data if isinstance(data, bytes) and len(data) <= MOST_BASE_TILE_BYTES else None

@@ -21,10 +21,10 @@ from gcsplan.mission_file import MissionFile, load_mission
 from gcsplan.mission_file.new_file import Draft, place_text, text_of
 from gcsplan.mission_file.source import is_sample
 from gcsplan.page.form import require_changes
-from gcsplan.page.history import Document, History
+from gcsplan.page.history import EditHistory, EditedDocument
 from gcsplan.page.places import place_of, with_heights
 from gcsplan.page.refused import PageError
-from gcsplan.page.store import UNNAMED, MissionStore
+from gcsplan.page.store import UNNAMED_FILE, MissionStore
 from gcsplan.vehicle import Autopilot
 from gcsplan.world.terrain.input_files import TERRAIN_FILES
 from gcsplan.world.terrain.sample import SAMPLE
@@ -35,7 +35,7 @@ PRESETS = {"copter": Autopilot.ARDUCOPTER, "wing": Autopilot.ARDUPLANE, "px4": A
 MOST_FILES, MOST_LOOKED_AT = 200, 5000
 """Most terrain files of the folder that the page offers, and most names of it that are looked at."""
 
-ENDS = {"vehicles[0].start": "start", "vehicles[0].goal": "goal"}
+DRAFT_ENDS = {"vehicles[0].start": "start", "vehicles[0].goal": "goal"}
 """The keys that make a draft a mission."""
 
 
@@ -46,11 +46,11 @@ class Edits:
         self.store = store
         self.planner: Planner | None = None
         self.restored = False
-        self._history = History()
+        self._history = EditHistory()
         self._live: dict[str, object] = {}
         self._draft: Draft | None = None
         self._ends: dict[str, Any] = {}
-        self._saved: Document | None = None
+        self._saved: EditedDocument | None = None
 
     @classmethod
     def of_file(cls, mission: Path) -> Edits:
@@ -82,7 +82,7 @@ class Edits:
         return "mission" if self.planner is not None else "empty" if self._draft is None else "draft"
 
     @property
-    def document(self) -> Document:
+    def document(self) -> EditedDocument:
         """A copy of the document; of a draft the keys that it has."""
         if self.planner is not None:
             return self.planner.mission
@@ -107,12 +107,12 @@ class Edits:
 
     @property
     def can_undo(self) -> bool:
-        """See `History`."""
+        """See `EditHistory`."""
         return self._history.can_undo
 
     @property
     def can_redo(self) -> bool:
-        """See `History`."""
+        """See `EditHistory`."""
         return self._history.can_redo
 
     # -- changes -------------------------------------------------------------------------------------------------
@@ -150,7 +150,7 @@ class Edits:
         """Again to the document that was undone."""
         self._moved(self._history.redo(self.document))
 
-    def _moved(self, document: Document | None) -> None:
+    def _moved(self, document: EditedDocument | None) -> None:
         self._live.clear()
         if document is not None and self.planner is not None:
             self.planner.restore(document)
@@ -182,10 +182,10 @@ class Edits:
             raise PageError("the name of a file is text", code="bad_message", where="name")
         document = self.planner.mission
         named = Path(name or "")
-        if self.store.file is None and document.get("name") == Path(UNNAMED).stem:
+        if self.store.file is None and document.get("name") == Path(UNNAMED_FILE).stem:
             document["name"] = named.stem
             self.store.text = (self.store.text or "").replace(
-                f"gcsplan plan {UNNAMED}\n", f"gcsplan plan {shlex.quote(named.name)}\n", 1
+                f"gcsplan plan {UNNAMED_FILE}\n", f"gcsplan plan {shlex.quote(named.name)}\n", 1
             )
         file = self.store.save(document, name, over=over)
         self.planner.restore(document)
@@ -213,11 +213,11 @@ class Edits:
         draft = Draft(start="", goal="", dem=dem, flat_m=flat_m, vertical_datum=datum,
                       autopilot=PRESETS[preset], max_agl_m=most)  # fmt: skip
         self.store = MissionStore(folder, None, None)
-        self.planner, self._history, self.restored, self._saved = None, History(), False, None
+        self.planner, self._history, self.restored, self._saved = None, EditHistory(), False, None
         self._live.clear()
         self._draft = draft if least is None else replace(draft, min_agl_m=least)
         self._ends = {}
-        given = {place: message.get(key) for place, key in ENDS.items() if message.get(key) is not None}
+        given = {place: message.get(key) for place, key in DRAFT_ENDS.items() if message.get(key) is not None}
         if given:
             self._change_draft(given)
 
@@ -226,14 +226,14 @@ class Edits:
         if self._draft is None:
             raise PageError("there is no mission yet: choose the ground first", code="bad_change")
         for place, value in changes.items():
-            if place not in ENDS:
+            if place not in DRAFT_ENDS:
                 raise PageError("this comes after the start and the goal", code="bad_change", where=place)
             if place_of(value, None) is None:
                 raise PageError("this is no place", code="bad_change", where=place)
-            self._ends[ENDS[place]] = value
-        if len(self._ends) == len(ENDS):
+            self._ends[DRAFT_ENDS[place]] = value
+        if len(self._ends) == len(DRAFT_ENDS):
             ends = replace(self._draft, start=_text(self._ends["start"]), goal=_text(self._ends["goal"]))
-            text = text_of(ends, UNNAMED, Path(UNNAMED).stem)
+            text = text_of(ends, UNNAMED_FILE, Path(UNNAMED_FILE).stem)
             self.store.text = text
             self._begin(load_mission(self.store.place, text=text))
 

@@ -13,7 +13,7 @@ from gcsplan.mission_file.json_schema import LATE_DEFAULTS, describe
 from gcsplan.mission_file.values.keys import Keys
 from gcsplan.mission_file.values.schema import LimitKeys, PlannerKeys, TerrainKeys, VehicleKeys
 from gcsplan.mission_file.values.units import UNIT_SYMBOLS, Written, other_names, unit_end
-from gcsplan.page.history import Document
+from gcsplan.page.history import EditedDocument
 from gcsplan.page.refused import PageError
 from gcsplan.units import Kind
 
@@ -36,7 +36,7 @@ class FormKey:
     quantity: Kind | None = None
 
 
-VEHICLE = "vehicles[0]"
+FIRST_VEHICLE = "vehicles[0]"
 FORM: tuple[FormKey, ...] = (
     FormKey("limits", "limits", LimitKeys, "min_agl_m", "Lowest height above ground", "height"),
     FormKey("limits", "limits", LimitKeys, "max_agl_m", "Legal ceiling above ground", "height"),
@@ -47,15 +47,15 @@ FORM: tuple[FormKey, ...] = (
     FormKey("limits", "limits", LimitKeys, "altitude_error_m", "Altitude error", "height"),
     FormKey("limits", "limits", LimitKeys, "max_climb_deg", "Steepest climb"),
     FormKey("limits", "terrain", TerrainKeys, "obstacle_height_m", "Trees and buildings", "height"),
-    FormKey("vehicle", VEHICLE, VehicleKeys, "name", "Name"),
-    FormKey("vehicle", VEHICLE, VehicleKeys, "autopilot", "Autopilot"),
-    FormKey("vehicle", VEHICLE, VehicleKeys, "end", "At the goal"),
-    FormKey("vehicle", VEHICLE, VehicleKeys, "rtl_rel_home_m", "Return altitude above home", "height"),
-    FormKey("vehicle", VEHICLE, VehicleKeys, "takeoff_agl_m", "Top of the take-off", "height"),
-    FormKey("vehicle", VEHICLE, VehicleKeys, "approach_agl_m", "Height above the goal", "height"),
-    FormKey("vehicle", VEHICLE, VehicleKeys, "climb_m_s", "Fastest climb rate", "climb_rate"),
-    FormKey("vehicle", VEHICLE, VehicleKeys, "descent_m_s", "Fastest descent rate", "climb_rate"),
-    FormKey("vehicle", VEHICLE, VehicleKeys, "turn_radius_m", "Turn radius of a fixed wing", "distance"),
+    FormKey("vehicle", FIRST_VEHICLE, VehicleKeys, "name", "Name"),
+    FormKey("vehicle", FIRST_VEHICLE, VehicleKeys, "autopilot", "Autopilot"),
+    FormKey("vehicle", FIRST_VEHICLE, VehicleKeys, "end", "At the goal"),
+    FormKey("vehicle", FIRST_VEHICLE, VehicleKeys, "rtl_rel_home_m", "Return altitude above home", "height"),
+    FormKey("vehicle", FIRST_VEHICLE, VehicleKeys, "takeoff_agl_m", "Top of the take-off", "height"),
+    FormKey("vehicle", FIRST_VEHICLE, VehicleKeys, "approach_agl_m", "Height above the goal", "height"),
+    FormKey("vehicle", FIRST_VEHICLE, VehicleKeys, "climb_m_s", "Fastest climb rate", "climb_rate"),
+    FormKey("vehicle", FIRST_VEHICLE, VehicleKeys, "descent_m_s", "Fastest descent rate", "climb_rate"),
+    FormKey("vehicle", FIRST_VEHICLE, VehicleKeys, "turn_radius_m", "Turn radius of a fixed wing", "distance"),
     FormKey("planner", "planner", PlannerKeys, "objective", "Shortest or least energy"),
     FormKey("planner", "planner", PlannerKeys, "gap_percent", "Gap at which planning stops"),
     FormKey("planner", "planner", PlannerKeys, "budget_s", "Longest search"),
@@ -70,7 +70,7 @@ ZONE_KEYS = frozenset(
 
 _PLACES = re.compile(r"vehicles\[\d{1,4}\]\.(start|goal|via)")
 _ZONE = re.compile(r"(?:no_fly|keep_in)\[\d{1,6}\](?:\.(\w+))?")
-_NUMBER = re.compile(r"\[\d{1,4}\]")
+_ELEMENT = re.compile(r"\[\d{1,4}\]")
 
 
 def require_changes(changes: object) -> Mapping[str, object]:
@@ -89,20 +89,20 @@ def require_changes(changes: object) -> Mapping[str, object]:
 def _is_of_form(place: str) -> bool:
     section, _, name = place.rpartition(".")
     section = section.removesuffix(".limits") if section.endswith("].limits") else section
-    if _NUMBER.search(section):
-        section = VEHICLE if _NUMBER.sub("[0]", section) == VEHICLE else ""
-        known = [k.key for k in FORM if k.section in (VEHICLE, "limits")]
+    if _ELEMENT.search(section):
+        section = FIRST_VEHICLE if _ELEMENT.sub("[0]", section) == FIRST_VEHICLE else ""
+        known = [k.key for k in FORM if k.section in (FIRST_VEHICLE, "limits")]
     else:
         known = [k.key for k in FORM if k.section == section]
     return bool(section) and (name in known or name in other_names(known))
 
 
-def form_of(document: Document, problems: Sequence[Mistake]) -> list[dict[str, Any]]:
+def form_of(document: EditedDocument, problems: Sequence[Mistake]) -> list[dict[str, Any]]:
     """The form's fields with their values; the mistakes of a key stand at its field."""
     return [_field(key, document, problems) for key in FORM]
 
 
-def _field(form: FormKey, document: Document, problems: Sequence[Mistake]) -> dict[str, Any]:
+def _field(form: FormKey, document: EditedDocument, problems: Sequence[Mistake]) -> dict[str, Any]:
     section = _section(document, form.section)
     name, other = _written(section, form.key)
     end = unit_end(form.key)
@@ -128,9 +128,9 @@ def _is_at(where: str, place: str) -> bool:
     )
 
 
-def _section(document: Document, place: str) -> dict[str, Any]:
+def _section(document: EditedDocument, place: str) -> dict[str, Any]:
     """The section of a place, empty where the document has none."""
-    if place == VEHICLE:
+    if place == FIRST_VEHICLE:
         vehicles = document.get("vehicles")
         found: Any = vehicles[0] if isinstance(vehicles, list) and vehicles else None
     else:
@@ -149,12 +149,12 @@ def _choices(annotation: Any) -> list[str]:
     return [c for c in get_args(annotation) if isinstance(c, str)]
 
 
-def cure_changes(document: Document, vehicle: str, cure: LimitValues) -> dict[str, float]:
+def cure_changes(document: EditedDocument, vehicle: str, cure: LimitValues) -> dict[str, float]:
     """The changes of keys that set the limits of a cure where the document has them."""
     return dict(_cured(document, vehicle, cure))
 
 
-def _cured(document: Document, vehicle: str, cure: LimitValues) -> Iterator[tuple[str, float]]:
+def _cured(document: EditedDocument, vehicle: str, cure: LimitValues) -> Iterator[tuple[str, float]]:
     vehicles = document.get("vehicles")
     listed = vehicles if isinstance(vehicles, list) else []
     number, own = next(((i, v) for i, v in enumerate(listed) if isinstance(v, dict) and v.get("name") == vehicle),

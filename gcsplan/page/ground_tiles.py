@@ -24,7 +24,7 @@ from gcsplan.world.geometry.zones import Box
 from gcsplan.world.terrain.terrain import OpenTerrain
 
 TILE_PIXELS = 256
-MOST_TILE_BYTES = 32 * 2**20
+MOST_TILES_BYTES = 32 * 2**20
 """Most bytes of all tiles that are kept."""
 
 MOST_BLOCKS, BLOCK_CELLS, MOST_CELLS = 3, 3_000_000, 16_000_000
@@ -36,12 +36,12 @@ BLOCK_ZOOMS = 2
 LEAST_ZOOM, MOST_ZOOM = 6, 15
 """Zooms of tiles; beyond, the map draws those of the last one larger."""
 
-NEAR_M = 1000.0
+MIDDLE_BOX_M = 1000.0
 SEA_OFFSET_M = 32768.0
 """Terrarium: metres above this far below the sea, as 256ths in red, green and blue."""
 
 
-Tile = tuple[int, int, int]
+TileNumber = tuple[int, int, int]
 
 
 class GroundTiles:
@@ -60,8 +60,8 @@ class GroundTiles:
         self.flat = keys.flat_m is not None and not keys.peaks
         self._frame = frame
         self._lock = threading.Lock()
-        self._tiles: OrderedDict[Tile, bytes | None] = OrderedDict()
-        self._blocks: OrderedDict[Tile, tuple[Frame, Surface, float]] = OrderedDict()
+        self._tiles: OrderedDict[TileNumber, bytes | None] = OrderedDict()
+        self._blocks: OrderedDict[TileNumber, tuple[Frame, Surface, float]] = OrderedDict()
         self.bounds = self._bounds()
 
     def _bounds(self) -> list[float] | None:
@@ -69,7 +69,7 @@ class GroundTiles:
         middle = self.terrain.middle_deg
         if middle is None:
             return None
-        frame, box = Frame(*middle), (-NEAR_M, -NEAR_M, NEAR_M, NEAR_M)
+        frame, box = Frame(*middle), (-MIDDLE_BOX_M, -MIDDLE_BOX_M, MIDDLE_BOX_M, MIDDLE_BOX_M)
         west, south, east, north = self.terrain.around(frame, box).extent(frame, box)
         corners = np.clip([[west, south], [west, north], [east, south], [east, north]], -FARTHEST_M, FARTHEST_M)
         degrees = frame.to_degrees(corners[:, 0], corners[:, 1])
@@ -87,11 +87,11 @@ class GroundTiles:
                 return self._tiles[tile]
             made = self._made(tile)
             self._tiles[tile] = made
-            while sum(len(t or b"") for t in self._tiles.values()) > MOST_TILE_BYTES or len(self._tiles) > 4096:
+            while sum(len(t or b"") for t in self._tiles.values()) > MOST_TILES_BYTES or len(self._tiles) > 4096:
                 self._tiles.popitem(last=False)
             return made
 
-    def _made(self, tile: Tile) -> bytes | None:
+    def _made(self, tile: TileNumber) -> bytes | None:
         block = self._block(tile)
         if block is None:
             return None
@@ -102,7 +102,7 @@ class GroundTiles:
         known = np.isfinite(ground)
         return _terrarium(np.where(known, ground, lowest_m)) if known.any() else None
 
-    def _block(self, tile: Tile) -> tuple[Frame, Surface, float] | None:
+    def _block(self, tile: TileNumber) -> tuple[Frame, Surface, float] | None:
         """The ground under a tile, with much around it if that is not too large."""
         z, x, y = tile
         for up in range(min(BLOCK_ZOOMS, z), -1, -1):
@@ -120,7 +120,7 @@ class GroundTiles:
                 return found
         return None
 
-    def _loaded(self, block: Tile, most_cells: int) -> tuple[Frame, Surface, float] | None:
+    def _loaded(self, block: TileNumber, most_cells: int) -> tuple[Frame, Surface, float] | None:
         lat, lon = _edges_deg(block)
         try:
             frame = self._frame or Frame(0.5 * (lat[0] + lat[1]), 0.5 * (lon[0] + lon[1]))
@@ -134,7 +134,7 @@ class GroundTiles:
         return frame, surface, float(np.nanmin(surface.ground_m))
 
 
-def _edges_deg(tile: Tile) -> tuple[tuple[float, float], tuple[float, float]]:
+def _edges_deg(tile: TileNumber) -> tuple[tuple[float, float], tuple[float, float]]:
     """South and north, west and east of a tile."""
     z, x, y = tile
     return (_lat_deg(y + 1.0, z), _lat_deg(y, z)), (x / 2**z * 360.0 - 180.0, (x + 1) / 2**z * 360.0 - 180.0)
@@ -144,7 +144,7 @@ def _lat_deg(y: float, z: int) -> float:
     return math.degrees(math.atan(math.sinh(math.pi * (1.0 - 2.0 * y / 2**z))))
 
 
-def _pixels_deg(tile: Tile) -> tuple[Floats, Floats]:
+def _pixels_deg(tile: TileNumber) -> tuple[Floats, Floats]:
     """Latitudes from the north and longitudes from the west of a tile's pixels, at their middles."""
     z, x, y = tile
     part = (np.arange(TILE_PIXELS) + 0.5) / TILE_PIXELS

@@ -12,10 +12,10 @@ import time
 from collections.abc import Awaitable, Callable, Iterable, MutableMapping
 from typing import Any
 
-Scope = MutableMapping[str, Any]
-Receive = Callable[[], Awaitable[MutableMapping[str, Any]]]
-Send = Callable[[MutableMapping[str, Any]], Awaitable[None]]
-App = Callable[[Scope, Receive, Send], Awaitable[None]]
+AsgiScope = MutableMapping[str, Any]
+AsgiReceive = Callable[[], Awaitable[MutableMapping[str, Any]]]
+AsgiSend = Callable[[MutableMapping[str, Any]], Awaitable[None]]
+AsgiApp = Callable[[AsgiScope, AsgiReceive, AsgiSend], Awaitable[None]]
 
 TOKEN_BYTES = 24
 
@@ -52,7 +52,7 @@ class Guard:
     ``port`` is the server's; ``map_host`` the origin of a base map that the user gave, or empty.
     """
 
-    def __init__(self, app: App, port: int, map_host: str = "") -> None:
+    def __init__(self, app: AsgiApp, port: int, map_host: str = "") -> None:
         self.token = secrets.token_urlsafe(TOKEN_BYTES)
         self._app = app
         self._host = f"127.0.0.1:{port}".encode()
@@ -60,7 +60,7 @@ class Guard:
         self._headers = list(_headers(f"127.0.0.1:{port}", map_host))
         self._rate = Rate(REQUESTS_PER_S, BURST)
 
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+    async def __call__(self, scope: AsgiScope, receive: AsgiReceive, send: AsgiSend) -> None:
         """Answer one request, or one WebSocket."""
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
@@ -79,7 +79,7 @@ class Guard:
 
         await self._app(inner, receive, with_headers)
 
-    def _refusal(self, scope: Scope) -> int:
+    def _refusal(self, scope: AsgiScope) -> int:
         """The status of a refusal; 0 for the page's own requests."""
         if not self._rate.allows():
             return 429
@@ -103,7 +103,7 @@ class Guard:
 
 
 async def _refuse(
-    scope: Scope, receive: Receive, send: Send, status: int, headers: Iterable[tuple[bytes, bytes]]
+    scope: AsgiScope, receive: AsgiReceive, send: AsgiSend, status: int, headers: Iterable[tuple[bytes, bytes]]
 ) -> None:
     if scope["type"] == "websocket":
         await receive()

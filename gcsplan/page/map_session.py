@@ -26,15 +26,15 @@ from gcsplan.page import answers
 from gcsplan.page.edits import Edits, terrain_choices
 from gcsplan.page.form import form_of
 from gcsplan.page.ground_tiles import LEAST_ZOOM, MOST_ZOOM, GroundTiles
-from gcsplan.page.history import Document
+from gcsplan.page.history import EditedDocument
 from gcsplan.page.places import read_text, vehicles_of
 from gcsplan.page.refused import PageError
 from gcsplan.page.zone_features import zones_geojson
 from gcsplan.units import SYSTEMS, Units
 from gcsplan.world.geodesy.frame import Frame
 
-Message = dict[str, Any]
-Send = Callable[[Message], None]
+PageMessage = dict[str, Any]
+SendAnswer = Callable[[PageMessage], None]
 
 LIVE_S, LIVE_MOST_S = 0.25, 2.0
 """A live plan that has no path after this many seconds gives way to a newer place; where paths take longer, after up to
@@ -43,7 +43,7 @@ the second number of seconds, so that some come while the pointer moves."""
 IDLE_S = 1.0
 """Seconds between two looks at the disk, and after the last edit until unsaved ones are kept."""
 
-MOST_WAITING = 1000
+MOST_MESSAGES_WAITING = 1000
 """Most messages that wait; live ones of one drag are joined."""
 
 SPARE_DEG = 0.01
@@ -57,11 +57,11 @@ class _Enough(Exception):
 class MapSession:
     """The state behind one page. ``send`` is called with each answer, from the session's thread."""
 
-    def __init__(self, edits: Edits, units: Units, base: Message | None = None) -> None:
+    def __init__(self, edits: Edits, units: Units, base: PageMessage | None = None) -> None:
         self._edits, self._units, self._base = edits, units, base
-        self._send: Send = lambda answer: None
-        self._waiting: queue.SimpleQueue[Message | None] = queue.SimpleQueue()
-        self._held: Message | None = None
+        self._send: SendAnswer = lambda answer: None
+        self._waiting: queue.SimpleQueue[PageMessage | None] = queue.SimpleQueue()
+        self._held: PageMessage | None = None
         self._count = 0
         self._n = 0
         self._planning_live: bool | None = None
@@ -82,13 +82,13 @@ class MapSession:
 
     # -- from the server's thread --------------------------------------------------------------------------------
 
-    def attach(self, send: Send) -> None:
+    def attach(self, send: SendAnswer) -> None:
         """Send all answers there from now on."""
         self._send = send
 
-    def hand_in(self, message: Message) -> None:
+    def hand_in(self, message: PageMessage) -> None:
         """Take a message of the page, in order. Raises PageError if too many wait."""
-        if self._waiting.qsize() >= MOST_WAITING:
+        if self._waiting.qsize() >= MOST_MESSAGES_WAITING:
             raise PageError("too many messages wait", code="bad_message")
         self._waiting.put(message)
         self.hurry()
@@ -127,7 +127,7 @@ class MapSession:
                 return
             self._answer(message)
 
-    def _next(self, wait_s: float) -> Message | None:
+    def _next(self, wait_s: float) -> PageMessage | None:
         """The next message; of live ones that wait in a row, the last with the changes of all."""
         if self._held is not None:
             message, self._held = self._held, None
@@ -154,7 +154,7 @@ class MapSession:
     def _superseded(self) -> bool:
         return self._held is not None or not self._waiting.empty()
 
-    def _answer(self, message: Message) -> None:
+    def _answer(self, message: PageMessage) -> None:
         self._n = message["n"]
         try:
             plans = self._do(message)
@@ -172,7 +172,7 @@ class MapSession:
         if (plans or self._owed) and self._edits.planner is not None:
             self._plan(live=_is_live(message))
 
-    def _do(self, message: Message) -> bool:
+    def _do(self, message: PageMessage) -> bool:
         """Follow a message; whether a plan follows. Raises PageError, InputError."""
         edits, kind = self._edits, message["type"]
         if kind == "change":
@@ -294,7 +294,7 @@ class MapSession:
     def _send_state(self) -> None:
         self._send(self.state())
 
-    def state(self) -> Message:
+    def state(self) -> PageMessage:
         """The page's whole state."""
         edits = self._edits
         document = edits.document
@@ -321,7 +321,7 @@ class MapSession:
             "problems": [{"where": p.where.rpartition(": ")[2], "message": p.message} for p in self._problems],
         }  # fmt: skip
 
-    def _find_tiles(self, document: Document, frame: Frame | None) -> None:
+    def _find_tiles(self, document: EditedDocument, frame: Frame | None) -> None:
         """Open the terrain for tiles where it is another one than before."""
         section = document.get("terrain")
         named = section, None if frame is None else (frame.lat_deg, frame.lon_deg)
@@ -334,7 +334,7 @@ class MapSession:
             with suppress(InputError):  # what is wrong with the terrain, the plan says
                 self._tiles = GroundTiles(section, self._edits.store.folder, frame)
 
-    def _terrain(self) -> Message | None:
+    def _terrain(self) -> PageMessage | None:
         tiles = self._tiles
         if tiles is None:
             return None
@@ -348,7 +348,7 @@ def _is_live(message: Mapping[str, Any]) -> bool:
     return message.get("live") is True and message["type"] == "change" and isinstance(message.get("changes"), dict)
 
 
-def _frame_of(document: Document) -> Frame | None:
+def _frame_of(document: EditedDocument) -> Frame | None:
     """The frame of a mission in local metres; None for one in degrees."""
     given = document.get("frame")
     if not isinstance(given, dict):
@@ -360,7 +360,7 @@ def _frame_of(document: Document) -> Frame | None:
         return None
 
 
-def _bounds_of(vehicles: list[Message]) -> list[float] | None:
+def _bounds_of(vehicles: list[PageMessage]) -> list[float] | None:
     """West, south, east, north around all places of the vehicles."""
     places = [p for v in vehicles for p in (v["start"], v["goal"], *v["via"]) if p is not None]
     if not places:

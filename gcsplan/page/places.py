@@ -10,7 +10,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from gcsplan.mission_file.values.places import Degrees, read_place
 from gcsplan.mission_file.values.point_keys import LocalPoint, ViaPoint
-from gcsplan.page.history import Document
+from gcsplan.page.history import EditedDocument
 from gcsplan.page.refused import PageError
 from gcsplan.world.geodesy.frame import Frame
 
@@ -37,10 +37,11 @@ def place_of(value: Any, frame: Frame | None) -> LatLon | None:
         return None
     if isinstance(point, LocalPoint):
         return None if frame is None else [float(x) for x in frame.to_degrees(point.east_m, point.north_m)]
-    return [point.lat_deg, point.lon_deg] if isinstance(point, Degrees) else None
+    on_earth = isinstance(point, Degrees) and abs(point.lat_deg) <= 90.0 and abs(point.lon_deg) <= 180.0
+    return [point.lat_deg, point.lon_deg] if on_earth else None
 
 
-def vehicles_of(document: Document, frame: Frame | None) -> list[dict[str, Any]]:
+def vehicles_of(document: EditedDocument, frame: Frame | None) -> list[dict[str, Any]]:
     """Each vehicle's name, autopilot and places; without a vehicle that is no mapping."""
     found = []
     vehicles = document.get("vehicles")

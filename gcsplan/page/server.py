@@ -17,8 +17,8 @@ from typing import Any
 
 from gcsplan.errors import InputError, UsageError
 from gcsplan.page.base_map import BaseMap
-from gcsplan.page.guard import App, Guard, Rate
-from gcsplan.page.map_session import MapSession, Message
+from gcsplan.page.guard import AsgiApp, Guard, Rate
+from gcsplan.page.map_session import MapSession, PageMessage
 from gcsplan.page.refused import PageError
 
 try:
@@ -62,7 +62,7 @@ LEAVE_S = 2
 """Seconds that open connections get when the server ends."""
 
 ForClient = Mapping[str, str]
-KEPT: ForClient = {"cache-control": "private, max-age=86400"}
+CACHED: ForClient = {"cache-control": "private, max-age=86400"}
 LOOKED_UP: ForClient = {"cache-control": "no-cache"}
 
 
@@ -124,7 +124,7 @@ class MapServer:
             await asyncio.sleep(HURRY_S)
             self._session.hurry()
 
-    def _app(self) -> App:
+    def _app(self) -> AsgiApp:
         return Starlette(
             routes=[
                 Route("/", self._file),
@@ -155,12 +155,12 @@ class MapServer:
         """Take the messages of the page; one page at a time counts, the newest."""
         await page.accept()
         before, self._page = self._page, page
-        outward: asyncio.Queue[Message] = asyncio.Queue()
+        outward: asyncio.Queue[PageMessage] = asyncio.Queue()
         loop = asyncio.get_running_loop()
         if before is not None:
             await _taken_over(before)
 
-        def send(answer: Message) -> None:
+        def send(answer: PageMessage) -> None:
             if self._page is page and not loop.is_closed():
                 loop.call_soon_threadsafe(outward.put_nowait, answer)
 
@@ -186,7 +186,7 @@ class MapServer:
                 self._page = None
 
 
-async def _sent(page: WebSocket, outward: asyncio.Queue[Message]) -> None:
+async def _sent(page: WebSocket, outward: asyncio.Queue[PageMessage]) -> None:
     """Send what the session answers; of live paths that wait, the last of each vehicle alone."""
     while True:
         waiting = [await outward.get()]
@@ -208,7 +208,7 @@ async def _taken_over(page: WebSocket) -> None:
         pass  # it is gone already
 
 
-def read_message(text: str) -> Message:
+def read_message(text: str) -> PageMessage:
     """A message of the page. Raises PageError for what is none."""
     try:
         message = json.loads(text, parse_constant=_no_number)
@@ -233,14 +233,14 @@ def _depth(value: Any) -> int:
     return 1 + max(map(_depth, inner), default=0)
 
 
-def _json(answer: Message) -> str:
+def _json(answer: PageMessage) -> str:
     return json.dumps(answer, ensure_ascii=False, separators=(",", ":"))
 
 
 def _tile(data: bytes | None, media_type: str) -> Response:
     if data is None:
         return Response("no tile\n", status_code=404, media_type="text/plain")
-    return Response(data, media_type=media_type, headers=dict(KEPT))
+    return Response(data, media_type=media_type, headers=dict(CACHED))
 
 
 def files_served() -> dict[str, Path]:

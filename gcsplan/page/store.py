@@ -19,12 +19,12 @@ from gcsplan.export.durable import write_whole
 from gcsplan.mission_file.changes import saved_text
 from gcsplan.mission_file.source import read_content
 from gcsplan.mission_file.values.yaml import MAX_YAML_BYTES
-from gcsplan.page.history import Document
+from gcsplan.page.history import EditedDocument
 from gcsplan.page.refused import PageError
 
 Disk = Literal["same", "changed", "gone"]
 
-UNNAMED = "mission.yaml"
+UNNAMED_FILE = "mission.yaml"
 """The name of a mission that has no file yet."""
 
 EDITS = ".{}.edits"
@@ -33,7 +33,7 @@ EDITS = ".{}.edits"
 MOST_EDITS_BYTES = 4 * MAX_YAML_BYTES
 """Most bytes of a file of edits that is read: JSON of the largest mission."""
 
-_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_. -]{0,95}\.ya?ml")
+_FILE_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_. -]{0,95}\.ya?ml")
 
 
 class MissionStore:
@@ -54,7 +54,7 @@ class MissionStore:
     @property
     def place(self) -> Path:
         """The file that the mission has, or would have."""
-        return self.file or self.folder / UNNAMED
+        return self.file or self.folder / UNNAMED_FILE
 
     @property
     def edits(self) -> Path:
@@ -74,7 +74,7 @@ class MissionStore:
             self._changed = "same" if _sha256(self.file) == self._sha256 else "changed"
         return self._changed
 
-    def reread(self) -> Document:
+    def reread(self) -> EditedDocument:
         """The document that the file holds now. Raises InputError."""
         if self.file is None:
             raise PageError("this mission has no file yet: save it first", code="bad_message")
@@ -83,7 +83,7 @@ class MissionStore:
         self._look()
         return document
 
-    def save(self, document: Document, name: str | None, *, over: bool) -> Path:
+    def save(self, document: EditedDocument, name: str | None, *, over: bool) -> Path:
         """Write the document into its file, or into the one called ``name``; all comments of its text stay.
 
         Raises PageError where the file is another one by now or exists already, unless ``over``, and InputError where
@@ -109,7 +109,7 @@ class MissionStore:
         self._look()
         return target
 
-    def keep(self, document: Document) -> None:
+    def keep(self, document: EditedDocument) -> None:
         """Keep unsaved edits beside the mission. Raises InputError."""
         self._kept = True
         kept = {"of_sha256": self._sha256, "mission": document, "text": self.text if self.file is None else None}
@@ -122,7 +122,7 @@ class MissionStore:
                 self.edits.unlink(missing_ok=True)
         self._kept = False
 
-    def kept(self) -> Document | None:
+    def kept(self) -> EditedDocument | None:
         """The unsaved edits of an earlier run; None if there are none that can be read.
 
         If they belong to another state of the file, the file counts as changed on the disk. Without a file, ``text`` is
@@ -145,7 +145,7 @@ class MissionStore:
 
     def _named(self, name: str | None) -> Path:
         """The file of the folder with this name. Raises PageError."""
-        if name is None or not _NAME.fullmatch(name):
+        if name is None or not _FILE_NAME.fullmatch(name):
             words = "give a name such as field.yaml: letters, digits, _ - . and blanks, without a folder"
             raise PageError(words, code="not_saved", where="name")
         return self.folder / name

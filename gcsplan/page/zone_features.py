@@ -10,16 +10,16 @@ from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
 from gcsplan.export.rows import outlines_deg
 from gcsplan.mission_file.zones.draft import ZoneDraft, place_zones
-from gcsplan.page.history import Document
+from gcsplan.page.history import EditedDocument
 from gcsplan.report.views.plan import zone_heights
 from gcsplan.units import Units
 from gcsplan.world.geodesy.frame import Frame
 
-BOUNDS = ("floor", "ceiling")
+ZONE_BOUNDS = ("floor", "ceiling")
 
 
 def zones_geojson(
-    document: Document, entries: Mapping[str, Sequence[ZoneDraft]], frame: Frame | None, units: Units
+    document: EditedDocument, entries: Mapping[str, Sequence[ZoneDraft]], frame: Frame | None, units: Units
 ) -> dict[str, Any]:
     """A FeatureCollection: each zone with the key of its entry, and what the page needs to edit it.
 
@@ -55,7 +55,7 @@ def _geometry(rings: Sequence[Floats]) -> dict[str, Any]:
     return {"type": "MultiPolygon", "coordinates": closed}
 
 
-def entry_of(document: Document, key: str) -> Any:
+def entry_of(document: EditedDocument, key: str) -> Any:
     """The value of an entry such as ``no_fly[3]``."""
     name, _, number = key.rstrip("]").partition("[")
     return document[name][int(number)]
@@ -73,7 +73,7 @@ def _about(key: str, entry: Any, draft: ZoneDraft, levels: str) -> dict[str, Any
         "center": list(draft.points[0]) if shape == "circle" else None,
         "radius_m": draft.radius_m if shape == "circle" else None,
         "polygon": [list(p) for p in draft.points] if shape == "polygon" else None,
-        **{bound: _bound(entry, bound) if own else None for bound in BOUNDS},
+        **{bound: _bound(entry, bound) if own else None for bound in ZONE_BOUNDS},
     }  # fmt: skip
 
 
