@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -16,6 +17,7 @@ from gcsplan.app.api import write
 from gcsplan.app.session import Planner
 from gcsplan.cli.command_table import app
 from gcsplan.page.server import MapServer
+from tests.page.browser_drag import dragged, table
 from tests.page.browser_hand import Hand
 from tests.page.talk import FLAT, eventually, serving
 from tests.support import browser as chromium
@@ -153,7 +155,7 @@ def test_everything_is_done_by_the_keyboard_too(hand: Hand) -> None:
     hand.until("document.querySelector('#place-0-goal').value.startsWith('46.51')")
     hand.judged()
     assert page.evaluate("[...document.querySelectorAll('button, input, select, [role=slider]')].filter((e) => e.offsetParent"
-                         " && !(e.ariaLabel || e.labels?.length || e.innerText.trim())).map((e) => e.outerHTML)") == []  # fmt: skip
+                         " && !(e.ariaLabel || e.labels?.length || e.textContent.trim())).map((e) => e.outerHTML)") == []  # fmt: skip
     assert page.complaints() == []
 
 
@@ -239,3 +241,12 @@ def test_the_page_fits_a_phone_and_a_dark_room(page: Browser, server: MapServer,
     paper = page.evaluate("getComputedStyle(document.body).backgroundColor")
     assert (paper == "rgb(20, 24, 29)") == dark
     assert stays_here(page, server)
+
+
+@pytest.mark.nightly
+def test_a_path_follows_every_place_with_little_time_of_the_page(page: Browser, tmp_path: Path) -> None:
+    found = dragged(page, tmp_path)
+    print(table(found))
+    assert len(found["path"]) == len(found["plan"]) == 50
+    own_ms = np.median(found["path"]) - np.median(found["plan"])  # without the plan: two ways, a frame, the drawing
+    assert own_ms < 60.0
