@@ -100,7 +100,14 @@ class GroundTiles:
         plane = frame.to_plane(*np.broadcast_arrays(lat[:, None], lon[None, :]))
         ground = surface.ground_at(plane[..., 0], plane[..., 1])
         known = np.isfinite(ground)
-        return _terrarium(np.where(known, ground, lowest_m)) if known.any() else None
+        return _terrarium(np.where(known, ground, lowest_m)) if known.any() or self._touched(tile) else None
+
+    def _touched(self, tile: TileNumber) -> bool:
+        """Whether a tile meets `bounds`: the page requests it then, also where the ground ends on the slant."""
+        if self.bounds is None:
+            return False
+        (south, north), (west, east) = _edges_deg(tile)
+        return self.bounds[0] <= east and west <= self.bounds[2] and self.bounds[1] <= north and south <= self.bounds[3]
 
     def _block(self, tile: TileNumber) -> tuple[Frame, Surface, float] | None:
         """The ground under a tile, with much around it if that is not too large."""

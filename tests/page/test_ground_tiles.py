@@ -47,6 +47,7 @@ def test_a_tile_has_the_heights_that_a_plan_flies_over() -> None:
     assert south < lat < far_north
 
 
+@pytest.mark.slow
 def test_tiles_of_all_zooms_agree_and_are_kept() -> None:
     tiles = GroundTiles(SAMPLE_TERRAIN, Path(), None)
     lat, lon = SAMPLE_MIDDLE_DEG
@@ -83,3 +84,7 @@ def test_hills_of_a_local_mission_stand_in_its_own_frame() -> None:
 def test_terrain_that_cannot_be_opened_is_bad_input(section: object, tmp_path: Path) -> None:
     with pytest.raises(InputError):
         GroundTiles(section, tmp_path, None)
+
+
+def test_a_tile_at_a_slanted_edge_is_there_because_the_page_requests_it() -> None:
+    assert (heights(GroundTiles(SAMPLE_TERRAIN, Path(), None).png(11, 544, 801)) > 200.0).all()
