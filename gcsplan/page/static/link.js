@@ -67,10 +67,6 @@ export function live(changes) {
   pump();
 }
 
-export function forget() {
-  waiting = null;
-}
-
 function pump() {
   if (!waiting || scheduled) return;
   scheduled = true;

@@ -1,31 +1,39 @@
 // Start, vias and goal as text: typed or pasted in any form of the mission file, moved up and down by their buttons.
 import { button, degrees, el, refill } from './dom.js';
 import { known, on } from './hub.js';
-import { change } from './link.js';
+import { change, send } from './link.js';
 import { canvas, goTo } from './map.js';
 import { enter } from './modes.js';
 import { changeVia } from './route.js';
 
-let box = null, waiting = null;
+let box = null;
+let waiting = null; // a text that the server reads as a place before the mission gets it: {id, n, put}
 
 export function startPlaces() {
   box = el('section', { id: 'places', 'aria-label': 'Start, vias and goal' });
   on('state', show);
-  on('asked', (n) => { if (waiting && !waiting.n) waiting.n = n; });
-  on('error', (message) => {
+  on('place', (message) => {
     if (!waiting || message.n !== waiting.n) return;
-    const problem = document.getElementById(`${waiting.id}-problem`);
-    if (!problem) return;
-    problem.textContent = message.message;
-    problem.hidden = false;
-    document.getElementById(waiting.id)?.setAttribute('aria-invalid', 'true');
+    const { put } = waiting;
+    say('');
+    waiting = null;
+    put();
   });
-  on('plan', () => { waiting = null; });
+  on('error', (message) => { if (waiting && message.n === waiting.n) say(message.message); });
   return box;
 }
 
+function say(words) {
+  const input = document.getElementById(waiting.id), problem = document.getElementById(`${waiting.id}-problem`);
+  if (!input) return;
+  problem.textContent = words;
+  problem.hidden = !words;
+  input.setAttribute('aria-invalid', String(Boolean(words)));
+  if (!words) delete input.dataset.dirty;
+}
+
 function show(state) {
-  if (box.contains(document.activeElement) && document.activeElement.dataset.dirty) return;
+  if (box.querySelector('[data-dirty]')) return; // what is being typed stays
   refill(box, ...state.vehicles.filter((v) => v.editable).flatMap((v, i) => ofVehicle(v, i, state.vehicles.length > 1)));
 }
 
@@ -42,14 +50,18 @@ function row(id, label, at, put, mode, remove) {
     id, type: 'text', value: at ? degrees(at) : '', placeholder: 'latitude, longitude; UTM; MGRS', autocomplete: 'off', spellcheck: 'false', 'aria-describedby': `${id}-problem`,
     oninput: () => { input.dataset.dirty = 'yes'; },
     onchange: () => {
-      delete input.dataset.dirty;
       const text = input.value.trim();
-      if (!text) return;
-      waiting = { id, n: 0 };
-      put(text);
+      if (text) waiting = { id, n: send({ type: 'place', text }), put: () => put(text) };
+      else restore();
     },
-    onkeydown: (event) => { if (event.key === 'Escape') { delete input.dataset.dirty; input.value = at ? degrees(at) : ''; } },
+    onkeydown: (event) => { if (event.key === 'Escape') restore(); },
   });
+  const restore = () => {
+    waiting = { id };
+    say('');
+    waiting = null;
+    input.value = at ? degrees(at) : '';
+  };
   const side = at ? button('◎', () => goTo(at), { 'aria-label': `Show ${label} on the map`, title: 'Show on the map' })
     : mode && known.state.stage === 'draft' ? button('Click', () => { enter(mode); canvas().focus({ preventScroll: true }); }, { 'aria-label': `Click ${label} on the map` }) : null;
   return el('div', { class: 'row' }, el('label', { for: id }, label), input, side,

@@ -2,7 +2,7 @@
 import { degrees } from './dom.js';
 import { known, on } from './hub.js';
 import { addGrip, grab, holding, moveGrip, removeGrip } from './grips.js';
-import { change, forget, live, send } from './link.js';
+import { change, live, step } from './link.js';
 import { canvas, frame, pixel, placeAt } from './map.js';
 import { addMode, enter, leave, modeNow } from './modes.js';
 import { lineOf } from './shapes.js';
@@ -23,8 +23,7 @@ export function startRoute() {
 }
 
 function cancel() {
-  forget();
-  send({ type: 'cancel' });
+  step({ type: 'cancel' });
   redraw(known.state);
 }
 

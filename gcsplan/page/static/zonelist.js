@@ -6,7 +6,7 @@ import { goTo } from './map.js';
 import { chosenZone, remove, select } from './zones.js';
 import { zones } from './shapes.js';
 
-const LEVELS = [['agl', 'above ground'], ['amsl', 'above sea level']];
+const LEVELS = [['agl', 'AGL'], ['amsl', 'AMSL']];
 let box = null, open = false;
 
 export function startZoneList() {

@@ -2,7 +2,7 @@
 import { button } from './dom.js';
 import { known, on, tell } from './hub.js';
 import { addGrip, holding, moveGrip, removeGrip } from './grips.js';
-import { change, forget, live, send } from './link.js';
+import { change, live, step } from './link.js';
 import { halfWay, moved, pixel, placeAt, size } from './map.js';
 import { addMode, leave, show } from './modes.js';
 import { choose, sketch, zones } from './shapes.js';
@@ -102,8 +102,7 @@ function redraw() {
 }
 
 function cancel() {
-  forget();
-  send({ type: 'cancel' });
+  step({ type: 'cancel' });
   redraw();
 }
 
