@@ -93,8 +93,8 @@ class GroundTiles:
 
     def _made(self, tile: TileNumber) -> bytes | None:
         block = self._block(tile)
-        if block is None:
-            return None
+        if block is None:  # too much ground for one tile is drawn flat
+            return _terrarium(np.zeros((TILE_PIXELS, TILE_PIXELS))) if self._touched(tile) else None
         frame, surface, lowest_m = block
         lat, lon = _pixels_deg(tile)
         plane = frame.to_plane(*np.broadcast_arrays(lat[:, None], lon[None, :]))

@@ -9,7 +9,7 @@ from typing import Any
 
 from tests.support.browser import Browser
 
-PATIENCE_S = 25.0
+PATIENCE_S = 90.0
 CODES = {
     "Enter": 13, "Escape": 27, "Delete": 46, "Tab": 9, "ArrowLeft": 37, "ArrowUp": 38, "ArrowRight": 39, "ArrowDown": 40
 }  # fmt: skip
