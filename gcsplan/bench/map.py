@@ -35,23 +35,25 @@ PAGE_ANSWER_S = 60.0
 GOAL = "vehicles[0].goal"
 
 
-def run(drags: int = 8, moves: int = 0, seed: int = 1, *, degree: bool = True) -> dict[str, Any]:
-    """Measure ``drags`` of the goal on the sample with few and many zones and on a tile of one degree, and the memory
-    that ``moves`` take (0: not measured)."""
-    result: dict[str, Any] = {"drags": drags, "places": DRAG_PLACES, "seed": seed}
+def run(
+    drags: int = 8, moves: int = 0, seed: int = 1, *, degree: bool = True, places: int = DRAG_PLACES
+) -> dict[str, Any]:
+    """Measure ``drags`` of the goal over ``places`` on the sample with few and many zones and on a tile of one degree,
+    and the memory that ``moves`` take (0: not measured)."""
+    result: dict[str, Any] = {"drags": drags, "places": places, "seed": seed}
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         for zones in (SESSION_ZONES, MANY_ZONES):
             rng = np.random.default_rng(seed)
             mission = drawn_mission(SAMPLE_TERRAIN, SAMPLE_MIDDLE_DEG, SAMPLE_HALF_M, rng, zones)
             with _page(mission, folder) as page:
-                result[f"zones_{zones}"] = _measured(page, SAMPLE_MIDDLE_DEG, drags, rng)
+                result[f"zones_{zones}"] = _measured(page, SAMPLE_MIDDLE_DEG, drags, rng, places)
         if degree:
             rng = np.random.default_rng(seed)
             middle = (46.5, 8.5)
             mission = drawn_mission(_written(degree_terrain(rng), folder), middle, (20_000.0, 20_000.0), rng)
             with _page(mission, folder) as page:
-                result["degree"] = _measured(page, middle, drags, rng)
+                result["degree"] = _measured(page, middle, drags, rng, places)
         if moves:
             rng = np.random.default_rng(seed)
             mission = drawn_mission(SAMPLE_TERRAIN, SAMPLE_MIDDLE_DEG, SAMPLE_HALF_M, rng)
@@ -135,12 +137,14 @@ def _drag(middle: tuple[float, float], rng: np.random.Generator, places: int) ->
     return [[round(float(lat), 6), round(float(lon), 6)] for lat, lon in degrees]
 
 
-def _measured(page: _Client, middle: tuple[float, float], drags: int, rng: np.random.Generator) -> dict[str, Any]:
+def _measured(
+    page: _Client, middle: tuple[float, float], drags: int, rng: np.random.Generator, count: int
+) -> dict[str, Any]:
     """Milliseconds over the socket, from each place to its path, and from each release to the plan: by the clock, and
     of the processor, which server and page together take."""
     paths, plans, refused = _Times(), _Times(), 0
     for drag in range(drags + 1):
-        places = _drag(middle, rng, DRAG_PLACES)
+        places = _drag(middle, rng, count)
         for place in places:
             paths.begin()
             answer = page.ask("change", "path", "refused", "error", changes={GOAL: place}, live=True)

@@ -39,7 +39,8 @@ def test_steps_are_taken_back_in_order_and_bounded() -> None:
 @pytest.mark.parametrize(
     "place",
     ["vehicles[0].goal", "vehicles[12].via", "vehicles[1].max_agl_m", "vehicles[1].limits.max_agl_ft", "no_fly[3]",
-     "limits.max_agl_ft", "no_fly[3].radius_m", "keep_in[0].ceiling_amsl_m", "planner.objective", "terrain.obstacle_height_m"],
+     "limits.max_agl_ft", "no_fly[3].radius_m", "keep_in[0].ceiling_amsl_m", "planner.objective",
+     "terrain.obstacle_height_m"],
 )  # fmt: skip
 def test_the_page_changes_places_zones_and_the_form(place: str) -> None:
     assert require_changes({place: None}) == {place: None}

@@ -183,6 +183,7 @@ def test_a_wrong_number_stands_at_its_field(desk: Desk) -> None:
     assert "write 51 or more" in next(f["error"] for f in form if f["key"] == "limits.max_agl_m")
 
 
+@pytest.mark.slow
 def test_a_save_keeps_the_comments_and_plans_the_same_by_the_command_line(desk: Desk, file: Path) -> None:
     desk.ask("hello", "plan")
     desk.ask("change", "state", changes={GOAL: [46.512, 8.512], "no_fly[2]": {"name": "tree", "center": [46.5, 8.52],
@@ -200,6 +201,7 @@ def test_a_save_keeps_the_comments_and_plans_the_same_by_the_command_line(desk: 
     assert (found["length_m"], found["bound"]) == (own.verdict.length_m, own.solution.lower_bound)
 
 
+@pytest.mark.slow
 def test_a_file_that_another_program_changed_is_not_overwritten(desk: Desk, file: Path) -> None:
     desk.ask("hello", "plan")
     desk.ask("change", "plan", changes={GOAL: [46.512, 8.512]})
@@ -224,6 +226,7 @@ def test_a_file_that_is_broken_meanwhile_is_words_and_the_edits_stay(desk: Desk,
     assert desk.ask("hello", "state")["vehicles"][0]["goal"] == [46.51, 8.51]
 
 
+@pytest.mark.slow
 def test_a_change_on_the_disk_is_told_without_a_question(desk: Desk, file: Path) -> None:
     desk.ask("hello", "home")
     file.write_text(FLAT + "# more\n")
@@ -239,6 +242,7 @@ def test_a_save_never_leaves_the_folder(desk: Desk, name: object, file: Path) ->
     assert [p.name for p in file.parent.iterdir()] == ["field.yaml"]
 
 
+@pytest.mark.slow
 def test_edits_that_are_not_saved_are_found_again(file: Path) -> None:
     session = MapSession(Edits.of_file(file), METRIC)
     desk = Desk(session)

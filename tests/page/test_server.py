@@ -175,6 +175,7 @@ def test_a_message_that_is_too_large_closes_the_socket(server: MapServer) -> Non
             page.until("state")
 
 
+@pytest.mark.slow
 def test_a_flood_closes_the_socket_and_the_server_goes_on(server: MapServer) -> None:
     with Page(server) as page:
         with suppress(ConnectionClosed):
@@ -187,6 +188,7 @@ def test_a_flood_closes_the_socket_and_the_server_goes_on(server: MapServer) -> 
         assert page.until("state")["stage"] == "mission"
 
 
+@pytest.mark.slow
 def test_a_second_tab_takes_over_and_the_first_is_told(server: MapServer) -> None:
     with Page(server) as first:
         first.send("hello")
