@@ -1,8 +1,8 @@
 """`python -m tests.page.browser_drag`: how long the path takes to follow the pointer, in a real browser.
 
-The goal of the sample mission, with 40 zones, is dragged over 50 places. The time of one place is that from the pointer's
-event in the page to the path in its SVG: the page's own work, both ways through the socket, and the plan. Drawing is apart:
-the time to the second next frame, on this page and on one that shows an empty map.
+The goal of the sample mission, with 40 zones, is dragged over 50 places. The time of one place begins with the pointer's
+event in the page and ends with the path in its SVG: the page's own work, both ways through the socket, and the plan.
+Drawing is apart: the time to the second next frame, on this page and on one that shows an empty map.
 """
 
 from __future__ import annotations
@@ -58,8 +58,8 @@ def mission_with_zones(count: int) -> str:
     text = Path("missions/jacksboro.yaml").read_text(encoding="utf-8")
     known = len(load_mission("missions/jacksboro.yaml").content.given["no_fly"])  # type: ignore[union-attr]
     rows = [
-        f"  - {{name: more {k}, center: [{36.60 + 0.013 * (k % 6):.4f}, {-84.35 + 0.024 * (k // 6):.4f}], radius_m: 60, "
-        "ceiling_agl_m: 40}\n"
+        f"  - {{name: more {k}, center: [{36.60 + 0.013 * (k % 6):.4f}, {-84.35 + 0.024 * (k // 6):.4f}], "
+        "radius_m: 60, ceiling_agl_m: 40}\n"
         for k in range(count - known)
     ]
     text = text.replace("way_home: required", "way_home: reported")  # not every return clears the rows

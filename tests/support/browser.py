@@ -41,8 +41,8 @@ class Browser:
         self._read, from_browser = os.pipe()
         flags = [
             "--headless", "--remote-debugging-pipe", f"--user-data-dir={home}", "--no-first-run", "--hide-scrollbars",
-            "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
-            "--disable-dev-shm-usage", "--disable-background-networking", "about:blank",
+            "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1", "--use-angle=swiftshader",
+            "--enable-unsafe-swiftshader", "--disable-dev-shm-usage", "--disable-background-networking", "about:blank",
         ]  # fmt: skip
         if os.geteuid() == 0:
             flags.insert(0, "--no-sandbox")  # Chromium's own sandbox does not start for root
