@@ -1,8 +1,8 @@
 """`python -m tests.page.browser_drag`: how long the path takes to follow the pointer, in a real browser.
 
-The goal of the sample mission, with 40 zones, is dragged over 50 places. The time of one place begins with the pointer's
-event in the page and ends with the path in its SVG: the page's own work, both ways through the socket, and the plan.
-Drawing is apart: the time to the second next frame, on this page and on one that shows an empty map.
+The goal of the sample mission, with 40 zones, is dragged over 50 places. The time of one place begins with the
+pointer's event in the page and ends with the path in its SVG: the page's own work, both ways through the socket, and
+the plan. Drawing is apart: the time to the second next frame, on this page and on one that shows an empty map.
 """
 
 from __future__ import annotations

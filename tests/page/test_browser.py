@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-for extra in ("starlette", "uvicorn", "websockets"):
-    pytest.importorskip(extra, reason="the extra map is not installed")
+pytest.importorskip("starlette", reason="the extra map is not installed")
+pytest.importorskip("uvicorn", reason="the extra map is not installed")
+pytest.importorskip("websockets", reason="the extra map is not installed")
 
 from gcsplan.app.api import write
 from gcsplan.app.session import Planner
@@ -27,6 +29,7 @@ PROGRAM = chromium.find()
 pytestmark = [
     pytest.mark.slow,
     pytest.mark.xdist_group("map"),
+    pytest.mark.skipif(find_spec("maplibre") is None, reason="the extra map is not installed"),
     pytest.mark.skipif(
         PROGRAM is None,
         reason=f"no browser: none of {', '.join(chromium.NAMES)} is installed (GCSPLAN_CHROMIUM names one)",
@@ -114,9 +117,7 @@ def test_a_mission_by_mouse_alone_has_the_bytes_of_the_command_line(page: Browse
         hand.click("#ask .main")
         hand.until("document.getElementById('save').textContent === 'Saved'")
         assert stays_here(page, server)
-        shown = json.loads(
-            page.evaluate("JSON.stringify([...document.querySelectorAll('#rest dd')].map((e) => e.innerText))")
-        )
+        shown = page.evaluate("[...document.querySelectorAll('#rest dd')].map((e) => e.innerText)")
     file = next(tmp_path.glob("*.yaml"))
     assert CliRunner().invoke(app, ["plan", str(file), "-o", str(tmp_path / "there")]).exit_code == 0
     planned = Planner(file).plan()
@@ -154,8 +155,9 @@ def test_everything_is_done_by_the_keyboard_too(hand: Hand) -> None:
     hand.write("#place-0-goal", "46°30'36\"N 8°30'18\"E")
     hand.until("document.querySelector('#place-0-goal').value.startsWith('46.51')")
     hand.judged()
-    assert page.evaluate("[...document.querySelectorAll('button, input, select, [role=slider]')].filter((e) => e.offsetParent"
-                         " && !(e.ariaLabel || e.labels?.length || e.textContent.trim())).map((e) => e.outerHTML)") == []  # fmt: skip
+    controls = "[...document.querySelectorAll('button, input, select, [role=slider]')].filter((e) => e.offsetParent)"
+    nameless = "filter((e) => !(e.ariaLabel || e.labels?.length || e.textContent.trim()))"
+    assert page.evaluate(f"{controls}.{nameless}.map((e) => e.outerHTML)") == []
     assert page.complaints() == []
 
 
@@ -236,8 +238,8 @@ def test_the_page_fits_a_phone_and_a_dark_room(page: Browser, server: MapServer,
     hand = Hand(page)
     hand.judged()
     assert page.evaluate("document.documentElement.scrollWidth") <= width
-    assert page.evaluate("[...document.querySelectorAll('button, select')].filter((e) => e.offsetParent && e.offsetHeight < 20 "
-                         "&& !e.classList.contains('spot')).map((e) => e.outerHTML)") == []  # fmt: skip
+    buttons = "[...document.querySelectorAll('button:not(.spot), select')].filter((e) => e.offsetParent)"
+    assert page.evaluate(f"{buttons}.filter((e) => e.offsetHeight < 24).map((e) => e.outerHTML)") == []
     paper = page.evaluate("getComputedStyle(document.body).backgroundColor")
     assert (paper == "rgb(20, 24, 29)") == dark
     assert stays_here(page, server)
