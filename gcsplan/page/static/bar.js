@@ -24,8 +24,9 @@ export function startBar() {
 }
 
 function shortcut(event) {
-  if (!(event.ctrlKey || event.metaKey) || event.altKey || event.target.closest('input, textarea, dialog')) return;
+  if (!(event.ctrlKey || event.metaKey) || event.altKey || event.target.closest('dialog')) return;
   const key = event.key.toLowerCase();
+  if (key !== 's' && event.target.closest('input')) return; // a field undoes its own typing
   const target = { z: event.shiftKey ? 'redo' : 'undo', y: 'redo', s: 'save' }[key];
   if (!target) return;
   event.preventDefault();

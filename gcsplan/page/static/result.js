@@ -25,7 +25,7 @@ export function startResult() {
     if (message.code === 'bad_mission') nothing(message.message, 'The mission has a mistake');
     if (message.code === 'bad_change') for (const answer of before) ({ plan, home, refused })[answer.type](answer);
   });
-  on('connection', (now) => { if (now !== 'open') current = null; if (now !== 'open') verdict('unjudged', '…', 'Not connected', 'The result below may be old.'); });
+  on('connection', (now) => { if (now !== 'open') nothing('The result below may be old.', 'Not connected'); });
   on('state', (state) => {
     if (state.stage === 'mission') { if (!known.plan) planning(); return; }
     clearPath();
@@ -43,7 +43,9 @@ export function startResult() {
 const planning = () => verdict('unjudged', '…', 'Planning', 'The mission is planned and judged.');
 
 function verdict(look, sign, word, words) {
-  const made = byId('verdict') || box.querySelector('.verdict');
+  const made = byId('verdict') || box.querySelector('.verdict'), text = [look, word, words].join('\n');
+  if (made.dataset.text === text) return; // a reader of the screen hears it once
+  made.dataset.text = text;
   made.className = `verdict ${look}`;
   made.replaceChildren(el('span', { class: 'sign', 'aria-hidden': 'true' }, sign), el('div', {}, el('strong', {}, word), el('p', {}, words)));
 }

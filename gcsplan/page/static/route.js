@@ -19,7 +19,8 @@ export function startRoute() {
   }
   addMode({ name: 'via', hint: 'Click a place that the path has to pass.', click: (place) => { leave(); insertVia(place); } });
   on('state', redraw);
-  document.addEventListener('pointerdown', (event) => { if (event.target.id === 'path-grasp' && !modeNow()) pull(event); }, true);
+  on('error', (message) => { if (message.code === 'bad_change') redraw(known.state); }); // the point goes back
+  document.addEventListener('pointerdown', (event) => { if (event.target.id === 'path-grasp' && event.pointerType !== 'touch' && !modeNow()) pull(event); }, true); // a finger moves the map
 }
 
 function cancel() {
@@ -111,7 +112,7 @@ function pull(event) {
     drop: (at) => { removeGrip(grip); changeVia(made.vehicle, put(at)); },
     cancel: () => { removeGrip(grip); cancel(); },
   });
-  for (const kind of ['mousedown', 'touchstart']) frame().addEventListener(kind, (e) => e.stopPropagation(), { capture: true, once: true });
+  frame().addEventListener('mousedown', (e) => e.stopPropagation(), { capture: true, once: true });
   grab(grip, event);
   grip.made.addEventListener('pointerup', () => setTimeout(() => { if (grip.made.isConnected) { removeGrip(grip); canvas().focus({ preventScroll: true }); } }));
 }

@@ -33,6 +33,7 @@ export function startZones() {
   });
   on('picked', (event) => select(event.target.dataset && event.target.dataset.key ? event.target.dataset.key : ''));
   on('state', () => { if (!holding()) redraw(); });
+  on('error', (message) => { if (message.code === 'bad_change') redraw(); });
 }
 
 const apart = (a, b) => Math.hypot(pixel(a)[0] - pixel(b)[0], pixel(a)[1] - pixel(b)[1]);
