@@ -195,9 +195,9 @@ def _memory(page: _Client, middle: tuple[float, float], moves: int, rng: np.rand
                 "change", "path", "refused", "error", "plan", changes={GOAL: place}, live=bool((k + 1) % DRAG_PLACES)
             )
 
-    move(2 * DRAG_PLACES)
-    gc.collect()
     tracemalloc.start()
+    move(2 * DRAG_PLACES)  # with all that is kept from one plan to the next
+    gc.collect()
     before, resident = tracemalloc.get_traced_memory()[0], _resident_bytes()
     move(moves)
     gc.collect()

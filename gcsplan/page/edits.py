@@ -21,7 +21,7 @@ from gcsplan.mission_file import MissionFile, load_mission
 from gcsplan.mission_file.new_file import Draft, place_text, text_of
 from gcsplan.mission_file.source import is_sample
 from gcsplan.page.form import require_changes
-from gcsplan.page.history import EditHistory, EditedDocument
+from gcsplan.page.history import EditedDocument, EditHistory
 from gcsplan.page.places import place_of, with_heights
 from gcsplan.page.refused import PageError
 from gcsplan.page.store import UNNAMED_FILE, MissionStore
