@@ -252,3 +252,22 @@ def test_a_path_follows_every_place_with_little_time_of_the_page(page: Browser, 
     assert len(found["path"]) == len(found["plan"]) == 50
     own_ms = np.median(found["path"]) - np.median(found["plan"])  # without the plan: two ways, a frame, the drawing
     assert own_ms < 60.0
+
+
+@pytest.mark.nightly
+def test_a_mistake_is_said_at_its_field_and_what_was_typed_stays(hand: Hand) -> None:
+    page, field, goal = hand.page, "#field-limits-min_agl_m", value(hand.page, "#place-0-goal")
+    page.evaluate("document.querySelector('#limit-list').open = true")
+    hand.write(field, "-5")
+    hand.until(f"document.querySelector('{field}-problem').textContent.includes('at least')")
+    assert value(page, field) == "-5"
+    assert hand.verdict() == "The mission has a mistake"
+    hand.write(field, "40")
+    hand.judged()
+    hand.write("#place-0-goal", "nowhere")
+    hand.until("document.querySelector('#place-0-goal-problem').textContent.includes('no place')")
+    assert value(page, "#place-0-goal") == "nowhere"
+    hand.judged()  # the mission keeps its goal
+    hand.key("Escape")
+    assert value(page, "#place-0-goal") == goal
+    assert page.complaints() == []

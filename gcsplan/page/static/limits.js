@@ -35,7 +35,7 @@ const id = (field) => `field-${field.key.replace(/[^\w]+/g, '-')}`;
 const number = (value, by) => String(Number((value / by).toPrecision(7)));
 
 function row(field) {
-  const name = id(field), about = { id: name, 'aria-describedby': `${name}-problem ${name}-help`, title: field.help, onchange: (event) => put(field, event.target) };
+  const name = id(field), about = { id: name, 'aria-describedby': `${name}-problem ${name}-help`, title: field.help, oninput: (event) => { event.target.dataset.typed = 'yes'; }, onchange: (event) => put(field, event.target) };
   const input = field.kind === 'choice'
     ? el('select', about, ...field.choices.map((c) => el('option', { value: c }, c)))
     : el('input', { ...about, type: field.kind === 'number' ? 'number' : 'text', step: 'any', autocomplete: 'off' });
@@ -47,7 +47,7 @@ function row(field) {
 function fill(field) {
   const input = document.getElementById(id(field)) || box.querySelector(`#${id(field)}`), problem = box.querySelector(`#${id(field)}-problem`);
   const word = (value) => (value === null || value === undefined ? '' : field.kind === 'number' ? number(value, size(field)) : String(value));
-  if (document.activeElement !== input || !field.error) input.value = word(field.value);
+  if (!input.dataset.typed) input.value = word(field.value); // what is being typed stays
   if (field.kind !== 'choice') input.placeholder = field.default === null || field.default === undefined ? 'none' : word(field.default);
   input.setAttribute('aria-invalid', String(Boolean(field.error)));
   problem.textContent = field.error || '';
@@ -55,6 +55,7 @@ function fill(field) {
 }
 
 function put(field, input) {
+  delete input.dataset.typed;
   const text = input.value.trim();
   if (field.kind === 'number' && input.validity.badInput) { input.value = ''; fill({ ...field, error: 'This is no number.' }); return; }
   change({ [field.key]: text === '' ? null : field.kind === 'number' ? Number((Number(text) * size(field)).toPrecision(12)) : text });
