@@ -134,7 +134,10 @@ class Edits:
             return
         self._live.clear()
         before = self.planner.mission
-        self.planner.change(changes)
+        try:
+            self.planner.change(changes)
+        except InputError as why:
+            raise PageError(why.message, code="bad_change", where=next(iter(changes))) from why
         if self.planner.mission != before:
             self._history.step(before)
 
@@ -212,6 +215,8 @@ class Edits:
         least, most = _metres(message, "min_agl_m"), _metres(message, "max_agl_m")
         draft = Draft(start="", goal="", dem=dem, flat_m=flat_m, vertical_datum=datum,
                       autopilot=PRESETS[preset], max_agl_m=most)  # fmt: skip
+        if self.planner is not None:
+            self.keep()  # what is not saved stays beside its own file
         self.store = MissionStore(folder, None, None)
         self.planner, self._history, self.restored, self._saved = None, EditHistory(), False, None
         self._live.clear()

@@ -202,7 +202,9 @@ class MapSession:
                 getattr(edits, kind)()
             self._disk = edits.store.disk()
             self._unkept = True
-        elif kind != "hello":
+        elif kind == "hello":
+            edits.cancel()  # a page that comes again has dropped what it dragged
+        else:
             raise PageError("this type of message is not known", code="bad_message", where="type")
         self._problems = ()
         self._send_state()
@@ -253,7 +255,7 @@ class MapSession:
         try:
             if self._superseded and not live:
                 return  # what is owed, comes after the message that waits
-            plan = planner.plan(dict(edits.live) or None, on_path=on_path, on_bound=on_bound)
+            plan = planner.plan(dict(edits.live) if live else None, on_path=on_path, on_bound=on_bound)
             self._planning_live = None
             self._send_plan(n, plan, time.perf_counter() - begun_s)
             self._owed = False

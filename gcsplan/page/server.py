@@ -212,6 +212,7 @@ def read_message(text: str) -> PageMessage:
     """A message of the page. Raises PageError for what is none."""
     try:
         message = json.loads(text, parse_constant=_no_number)
+        deep = _depth(message) > MOST_DEPTH
     except (ValueError, RecursionError):
         raise PageError("a message is one object of JSON", code="bad_message") from None
     if not isinstance(message, dict) or not isinstance(message.get("type"), str):
@@ -219,7 +220,7 @@ def read_message(text: str) -> PageMessage:
     n = message.get("n")
     if isinstance(n, bool) or not isinstance(n, int) or not 0 < n <= MOST_N:
         raise PageError("a message has n, a whole number that grows", code="bad_message", where="n")
-    if _depth(message) > MOST_DEPTH:
+    if deep:
         raise PageError(f"a message has lists in each other, {MOST_DEPTH} deep at most", code="bad_message")
     return message
 

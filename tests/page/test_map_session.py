@@ -139,6 +139,13 @@ def test_a_drop_is_one_step_that_undo_takes_back_and_redo_makes(desk: Desk) -> N
     assert desk.ask("redo", "state")["vehicles"][0]["goal"] == [46.513, 8.51]
 
 
+def test_a_page_that_comes_again_in_a_drag_gets_the_certificate_of_the_document(desk: Desk) -> None:
+    desk.ask("hello", "plan")
+    desk.ask("change", "path", changes={GOAL: [46.52, 8.51]}, live=True)
+    found = desk.ask("hello", "plan")["vehicles"][0]
+    assert found["profile"]["lat"][-1] == pytest.approx(46.51)
+
+
 def test_escape_forgets_the_drag(desk: Desk) -> None:
     desk.ask("hello", "plan")
     desk.ask("change", "path", changes={GOAL: [46.52, 8.51]}, live=True)
