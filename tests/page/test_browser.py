@@ -90,6 +90,10 @@ def test_a_dragged_goal_is_followed_by_a_path_and_judged_on_release(hand: Hand, 
     assert page.evaluate("document.getElementById('path').getAttribute('d')") != solid
     assert value(page, "#place-0-goal") != before
     assert not page.evaluate("document.getElementById('undo').disabled")
+    # What is called safe has a safe way home, which is judged after the path.
+    hand.until("document.querySelector('[data-key=way_home]')")
+    returns = page.evaluate("!document.querySelector('[data-key=way_home].bad')")
+    assert hand.verdict() == ("safe" if returns else "path safe")
     assert stays_here(page, server)
 
 

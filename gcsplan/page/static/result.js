@@ -83,19 +83,26 @@ function plan(message) {
   current = message;
   before = [message];
   clearPath();
-  const look = LOOK[message.verdict] || LOOK['not judged'];
   for (const v of message.vehicles) {
     drawPath(v.vehicle, v.line, { safe: 'judged', violations: 'unsafe' }[v.verdict] || 'draft');
   }
   drawNoHome(message.vehicles.flatMap((v) => (v.way_home ? v.way_home.unsafe : [])));
   markPlace(null);
-  verdict(look[0], look[1], message.verdict, message.headline);
+  judged(message.verdict, message.vehicles.map((v) => v.way_home), message.headline);
   showGap(null);
   const rest = box.querySelector('#rest');
   rest.classList.remove('old');
   rest.replaceChildren(...message.vehicles.flatMap((v) => ofVehicle(v, message.vehicles.length > 1)),
     ...[list('Left out', (message.left_out || []).map((l) => `${l.name}: ${l.message}`), true), list('Notes on all', message.notes || [], false)].filter((p) => p));
   tell('judged', message);
+}
+
+// A mission is called safe with all its returns; before they are judged, or where one is unsafe, its path alone is.
+function judged(word, homes, words) {
+  const [look, sign] = LOOK[word] || LOOK['not judged'], returns = homes.every((home) => home && home.safe === true);
+  if (word !== 'safe' || returns) verdict(look, sign, word, words);
+  else if (homes.some((home) => home && home.safe !== true)) verdict('unjudged', '!', 'path safe', words);
+  else verdict(look, sign, 'path safe', words);
 }
 
 function ofVehicle(v, many) {
@@ -119,7 +126,7 @@ const homeWords = (vehicle, way) => el('p', { class: `bare${way && way.unsafe.le
 function home(message) {
   if (!current || current.n !== message.n) return;
   before = [current, message];
-  if (message.headline) verdict(...LOOK[current.verdict] || LOOK['not judged'], current.verdict, message.headline);
+  judged(current.verdict, current.vehicles.map((v) => message.vehicles.find((h) => h.vehicle === v.vehicle)?.way_home), message.headline);
   drawNoHome(message.vehicles.flatMap((v) => (v.way_home ? v.way_home.unsafe : [])));
   for (const v of message.vehicles) {
     const row = box.querySelector(`[data-home="${v.vehicle}"]`);
