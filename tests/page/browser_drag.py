@@ -66,11 +66,11 @@ def mission_with_zones(count: int) -> str:
     return text.replace("\nvehicles:\n", "".join(rows) + "\nvehicles:\n", 1)
 
 
-def dragged(page: Browser, folder: Path, zones: int = ZONES, places: int = PLACES) -> dict[str, list[float]]:
+def dragged(page: Browser, folder: Path, places: int = PLACES) -> dict[str, list[float]]:
     """Milliseconds by name: ``path`` (pointer to path), ``plan`` (in the server), ``judged`` (release to verdict),
     ``frames`` and ``empty`` (two frames, with the mission and on an empty map)."""
     file = folder / "zones.yaml"
-    file.write_text(mission_with_zones(zones), encoding="utf-8")
+    file.write_text(mission_with_zones(ZONES), encoding="utf-8")
     page.ask("Page.addScriptToEvaluateOnNewDocument", source=LISTEN)
     hand, found = Hand(page), {}
     with serving(None, folder) as server:
@@ -114,8 +114,7 @@ def main() -> None:
     if program is None:
         sys.exit(f"needs a browser: {', '.join(chromium.NAMES)}, or the one that GCSPLAN_CHROMIUM names")
     with tempfile.TemporaryDirectory() as folder, chromium.browser(program, Path(folder, "home")) as page:
-        for zones in (ZONES, 5 * ZONES):
-            print(f"{zones} zones\n{table(dragged(page, Path(folder), zones))}")
+        print(f"{ZONES} zones\n{table(dragged(page, Path(folder)))}")
 
 
 if __name__ == "__main__":
