@@ -1,6 +1,7 @@
 """`python docs/_make_pictures.py`: the pictures of README and documents, made from the sample mission.
 
 They are in `docs/pictures/`. `report.webp` is the top of the page that ``gcsplan plan --report`` writes, in Chromium.
+`map.webp` is the page of ``gcsplan map`` with the same mission.
 `optimal.png` is the default planner's proof: terrain above the cap, and the cells that a shorter path could meet.
 Each picture holds the path's length in its description, which a test compares with a plan.
 """
@@ -32,35 +33,65 @@ TOP = Path(__file__).parents[1]
 PICTURES = TOP / "docs" / "pictures"
 WALL, ROOM = "#b04a3a", "#2c7fb8"
 PAGE_PX = 1100
+MAP_PX = 1100, 740
 """Width of the page in the picture; its height ends below the map's legend."""
 
 
 def main() -> None:
-    """Write both pictures."""
+    """Write all pictures."""
     source = load_mission(TOP / "missions" / "jacksboro.yaml")
     planned = plan(source)
     problem, _ = make_problem(source, source.vehicles[0], world_of(source), source.planner.objective, 1)
     proof = io.BytesIO()
     save_proof(problem, proof)
-    page = picture_of_page(gcsplan.report(planned), f"uav1: {planned.vehicles[0].verdict.length_m:,.0f} m")
-    for name, content in (("report.webp", page), ("optimal.png", proof.getvalue())):
+    length = f"uav1: {planned.vehicles[0].verdict.length_m:,.0f} m"
+    page = picture_of_page(gcsplan.report(planned), length)
+    for name, content in (
+        ("report.webp", page),
+        ("map.webp", picture_of_map(length)),
+        ("optimal.png", proof.getvalue()),
+    ):
         (PICTURES / name).write_bytes(content)
         print(f"{PICTURES / name}: {len(content):,} bytes")
 
 
 def picture_of_page(html: str, description: str) -> bytes:
     """The top of a report, down to the legend of its map, as WebP with a description."""
-    program = browser.find()
-    if program is None:
-        raise SystemExit(f"needs a browser: {', '.join(browser.NAMES)}, or the one that GCSPLAN_CHROMIUM names")
-    with tempfile.TemporaryDirectory() as folder, browser.browser(program, Path(folder, "home")) as shown:
+    with tempfile.TemporaryDirectory() as folder, browser.browser(program(), Path(folder, "home")) as shown:
         file = Path(folder, "report.html")
         file.write_text(html, encoding="utf-8")
         shown.visit(file, width=PAGE_PX)
         legend = "document.querySelector('#map + .legend').getBoundingClientRect().bottom"
         shown.visit(file, width=PAGE_PX, height=round(shown.evaluate(legend)) + 8)
-        screen = Image.open(io.BytesIO(shown.picture())).convert("RGB")
-    exif = Image.Exif()
+        return webp(shown.picture(), description)
+
+
+def picture_of_map(description: str) -> bytes:
+    """The page to plan on, after the sample mission is judged with its way home, as WebP with a description."""
+    from tests.page.browser_hand import Hand  # these need the extra map, and a test reads this file without it
+    from tests.page.talk import serving
+
+    with tempfile.TemporaryDirectory() as folder, browser.browser(program(), Path(folder, "home")) as shown:
+        file = Path(folder, "jacksboro.yaml")
+        file.write_bytes((TOP / "missions" / "jacksboro.yaml").read_bytes())
+        with serving(file, Path(folder)) as server:
+            shown.visit(server.url, width=MAP_PX[0], height=MAP_PX[1])
+            Hand(shown).judged()
+            shown.evaluate("new Promise((done) => setTimeout(done, 3000))")  # the ground's tiles
+            return webp(shown.picture(), description)
+
+
+def program() -> str:
+    """The browser. Raises SystemExit."""
+    found = browser.find()
+    if found is None:
+        raise SystemExit(f"needs a browser: {', '.join(browser.NAMES)}, or the one that GCSPLAN_CHROMIUM names")
+    return found
+
+
+def webp(png: bytes, description: str) -> bytes:
+    """A picture as WebP that holds its description."""
+    screen, exif = Image.open(io.BytesIO(png)).convert("RGB"), Image.Exif()
     exif[ExifTags.Base.ImageDescription] = description
     content = io.BytesIO()
     screen.save(content, "WEBP", quality=85, method=6, exif=exif)

@@ -177,14 +177,32 @@ def _own_text(value: object, of: Callable[[object], str]) -> str:
         return ""
 
 
+LimitValues = tuple[tuple[str, float], ...]
+"""Keys of limits, such as ``max_agl_m``, each with a value in SI."""
+
+
 class NoMission(GcsplanError, RuntimeError):
-    """There is no safe mission, and none is better than a wrong one. The message names the binding constraint."""
+    """There is no safe mission, and none is better than a wrong one. The message names the binding constraint.
+
+    ``vehicle`` is the vehicle without one, and ``at`` (latitude, longitude in degrees) the place that binds, if there
+    is a single one. ``cures``: limits with which a whole mission was planned, each cure by itself.
+    """
 
     exit_code = 3
     default_reason = "not_found"
 
-    def __init__(self, message: str, *, reason: NoMissionReason, where: str = "") -> None:
+    def __init__(
+        self,
+        message: str,
+        *,
+        reason: NoMissionReason,
+        where: str = "",
+        vehicle: str = "",
+        at: tuple[float, float] | None = None,
+        cures: tuple[LimitValues, ...] = (),
+    ) -> None:
         super().__init__(message, where=where, reason=reason)
+        self.vehicle, self.at, self.cures = vehicle, at, cures
 
 
 class CheckFailed(GcsplanError, RuntimeError):

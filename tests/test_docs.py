@@ -272,8 +272,9 @@ def test_what_loads_from_elsewhere_is_seen(made: ModuleType, text: str, foreign:
 
 def test_the_pictures_show_the_sample_mission_as_it_is_planned_today() -> None:
     (vehicle,) = gcsplan.plan(str(TOP / "missions" / "jacksboro.yaml")).vehicles
-    with Image.open(DOCS / "pictures" / "report.webp") as page:
-        assert page.getexif()[ExifTags.Base.ImageDescription] == f"uav1: {vehicle.verdict.length_m:,.0f} m", CURE
+    for name in ("report.webp", "map.webp"):
+        with Image.open(DOCS / "pictures" / name) as page:
+            assert page.getexif()[ExifTags.Base.ImageDescription] == f"uav1: {vehicle.verdict.length_m:,.0f} m", CURE
     with Image.open(DOCS / "pictures" / "optimal.png") as proof:
         bound = f"no path is shorter than {vehicle.solution.lower_bound:,.0f} m"
         assert proof.info["Description"].startswith(bound), CURE

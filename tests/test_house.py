@@ -63,12 +63,13 @@ MAY_IMPORT: dict[str, set[str]] = {
     "sim": VEHICLE | MAVLINK | {"check", "dem", "wind"},
     "mission_file": OUTWARD | TERRAIN,
     "app": OUTWARD | {"dem", "mission_file"},
-    "bench": APP,
+    "page": APP,
+    "bench": APP | {"page"},
     # Research imports the product, and only the command line imports research.
     "research.optimisers": {"arrays", "errors", "plugins"},
     "research.swarm": WORLD | {"planners", "research.optimisers"},
-    "research.bench": APP | {"bench", "research.optimisers", "research.swarm"},
-    "cli": APP | {"bench", "dem", "logs", "research.bench"},
+    "research.bench": APP | {"bench", "page", "research.optimisers", "research.swarm"},
+    "cli": APP | {"bench", "dem", "logs", "page", "research.bench"},
     "__main__": {"cli"},
 }
 
@@ -86,6 +87,7 @@ SOCKETS = {
     "dem/download.py",
     "mavlink/link/link.py",
     "mavlink/link/transport.py",
+    "page/server.py",
     "sim/vehicle/server.py",
 }
 NETWORK = {"socket", "socketserver", "select", "selectors", "asyncio", "ssl", "http", "urllib", "serial"}

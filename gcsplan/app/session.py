@@ -15,7 +15,7 @@ import os
 import re
 import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -153,6 +153,14 @@ class Planner:
         with self._state:
             self._content = _changed(self._content, changes)
 
+    def restore(self, mission: Mapping[str, object]) -> None:
+        """Set all keys to those of ``mission``, such as an earlier `mission` of this session.
+
+        Raises InputError, UsageError."""
+        require_kind("restore()", "mission", mission, Mapping, "a mapping of a mission's keys")
+        with self._state:
+            self._content = _with_keys(self._content, mission)
+
     def plan(
         self,
         changes: Mapping[str, object] | None = None,
@@ -251,7 +259,7 @@ def _changed(content: Content, changes: Mapping[str, object]) -> Content:
     """The content with other values of some keys. Raises InputError, UsageError."""
     expected = "a mapping from keys to values, such as {'limits.min_agl_m': 40}"
     require_kind("change()", "changes", changes, Mapping, expected)
-    given, held = dict(content.given), dict(content.held)
+    given = dict(content.given)
     touched: set[str] = set()  # sections of which ``given`` has its own copy
     for place, value in elements("change()", "changes", changes.items(), tuple, expected):
         if not isinstance(place, str):
@@ -263,8 +271,15 @@ def _changed(content: Content, changes: Mapping[str, object]) -> Content:
         touched.add(section)
         with failing(f"change(): {place[:80]}"):  # a stranger's mapping
             _put(given, place, value)
-    new = {section: given[section] for section in touched if section in given}
-    given |= read_content(new, None, held=held)[2]  # arrays, GeoJSON and tuples as in any mapping
+    return _with_keys(content, given, touched)
+
+
+def _with_keys(content: Content, keys: Mapping[str, object], touched: Collection[str] | None = None) -> Content:
+    """The content with these keys alone; those of ``touched`` sections (None: of all) may be arrays, GeoJSON, tuples,
+    as in any mapping."""
+    held = dict(content.held)
+    new = {section: value for section, value in keys.items() if touched is None or section in touched}
+    given = dict(keys) | read_content(new, None, held=held)[2]
     text = repr(given) if held else ""
     return replace(content, given=given, held={name: data for name, data in held.items() if repr(name) in text})
 

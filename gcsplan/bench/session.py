@@ -30,11 +30,11 @@ def run(changes: int = 40, cancels: int = 40, memory_changes: int = 0, seed: int
     """Measure ``changes`` of the goal on the sample with zones and on a tile of one degree, ``cancels`` at random
     moments of a plan, and the memory that ``memory_changes`` take (0: not measured)."""
     rng = np.random.default_rng(seed)
-    sample = _mission(SAMPLE_TERRAIN, SAMPLE_MIDDLE_DEG, SAMPLE_HALF_M, rng)
+    sample = drawn_mission(SAMPLE_TERRAIN, SAMPLE_MIDDLE_DEG, SAMPLE_HALF_M, rng)
     result: dict[str, Any] = {"changes": changes, "zones": SESSION_ZONES, "seed": seed}
     result["sample"] = _first_paths(sample, SAMPLE_MIDDLE_DEG, changes, rng)
     middle = (46.5, 8.5)
-    degree = _mission(_degree(rng), middle, (20_000.0, 20_000.0), rng)
+    degree = drawn_mission(degree_terrain(rng), middle, (20_000.0, 20_000.0), rng)
     result["degree"] = _first_paths(degree, middle, changes, rng)
     result["cancel"] = _cancels(sample, cancels, rng)
     if memory_changes:
@@ -58,7 +58,7 @@ def report(result: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def _degree(rng: np.random.Generator) -> dict[str, Any]:
+def degree_terrain(rng: np.random.Generator) -> dict[str, Any]:
     """A tile of one degree of hills, m AMSL, as a script hands it in."""
     x = np.linspace(0.0, 1.0, DEGREE_POSTS)
     heights = np.full((DEGREE_POSTS, DEGREE_POSTS), 900.0, np.float32)
@@ -75,21 +75,24 @@ def _place(middle: tuple[float, float], half_m: tuple[float, float], rng: np.ran
     return [round(float(v), 6) for v in Frame(*middle).to_degrees(east, north)]
 
 
-def _mission(
-    terrain: dict[str, Any], middle: tuple[float, float], half_m: tuple[float, float], rng: np.random.Generator
-) -> dict[str, Any]:
+def drawn_mission(
+    terrain: dict[str, Any], middle: tuple[float, float], half_m: tuple[float, float], rng: np.random.Generator,
+    zones: int = SESSION_ZONES,
+) -> dict[str, Any]:  # fmt: skip
+    """A mission of one copter that starts in the middle, with circles around it."""
     vehicle = {"name": "uav1", "sysid": 1, "autopilot": "arducopter", "start": list(middle),
-               "goal": _goal(middle, rng)}  # fmt: skip
-    zones = [
+               "goal": drawn_goal(middle, rng)}  # fmt: skip
+    circles = [
         {"name": f"zone{k}", "center": _place(middle, half_m, rng), "radius_m": round(float(rng.uniform(80, 500)), 1)}
-        for k in range(SESSION_ZONES)
+        for k in range(zones)
     ]
     near = Frame(*middle)
-    zones = [z for z in zones if np.hypot(*near.to_plane(*z["center"])) > z["radius_m"] + 150.0]  # type: ignore[misc,operator]
-    return {"version": 1, "terrain": terrain, "limits": {"min_agl_m": 60}, "no_fly": zones, "vehicles": [vehicle]}
+    circles = [z for z in circles if np.hypot(*near.to_plane(*z["center"])) > z["radius_m"] + 150.0]  # type: ignore[misc,operator]
+    return {"version": 1, "terrain": terrain, "limits": {"min_agl_m": 60}, "no_fly": circles, "vehicles": [vehicle]}
 
 
-def _goal(middle: tuple[float, float], rng: np.random.Generator) -> list[float]:
+def drawn_goal(middle: tuple[float, float], rng: np.random.Generator) -> list[float]:
+    """A place around the middle, latitude and longitude."""
     turn, far_m = rng.uniform(0.0, 2.0 * math.pi), rng.uniform(*LEGS_M)
     east, north = far_m * math.cos(turn), far_m * math.sin(turn)
     return [round(float(v), 6) for v in Frame(*middle).to_degrees(east, north)]
@@ -109,7 +112,7 @@ def _first_paths(
             seen_s.append(time.thread_time())
 
         try:
-            session.plan({"vehicles.uav1.goal": _goal(middle, rng)}, on_path=on_path)
+            session.plan({"vehicles.uav1.goal": drawn_goal(middle, rng)}, on_path=on_path)
         except GcsplanError:
             continue  # the goal lies in a zone, or no path leads to it
         wholes.append(time.thread_time() - begun_s)
@@ -154,7 +157,7 @@ def _cancels(mission: dict[str, Any], count: int, rng: np.random.Generator) -> d
 def _memory(mission: dict[str, Any], changes: int, rng: np.random.Generator) -> dict[str, Any]:
     """Bytes that Python holds more after many changes than before them."""
     session = Planner(mission)
-    goals = [_goal(SAMPLE_MIDDLE_DEG, rng) for _ in range(MEMORY_PLANS)]
+    goals = [drawn_goal(SAMPLE_MIDDLE_DEG, rng) for _ in range(MEMORY_PLANS)]
 
     def change(count: int) -> None:
         for k in range(count):

@@ -11,6 +11,7 @@ import typer
 
 from gcsplan.cli.commands import batch, check, new, plan, rehearse, schema, wind
 from gcsplan.cli.commands import fit_energy as energy
+from gcsplan.cli.commands import map as page
 from gcsplan.cli.commands import sim as fly
 from gcsplan.cli.commands import vehicles as links
 from gcsplan.cli.commands.bench import bench_app
@@ -32,6 +33,7 @@ app.add_typer(dem_app, name="dem")
 app.add_typer(terrain_app, name="terrain")
 app.add_typer(bench_app, name="bench")
 app.command(short_help="Write a commented mission file.")(new.new)
+app.command("map", short_help="Plan on a map in the browser.")(page.map_)
 app.command(short_help="Plan a mission file; upload and verify on request.")(plan.plan)
 app.command(short_help="Plan many mission files: a table, a map.")(batch.batch)
 app.command(short_help="Plan, fly it all in a simulator, judge.")(rehearse.rehearse)

@@ -115,6 +115,11 @@ class DatTerrain:
             raise InputError(words, where=place(where, "nodata"))
         require_metres(spec, "the heights of .DAT files are", where=place(where, "vertical_datum"))
 
+    @property
+    def middle_deg(self) -> tuple[float, float] | None:
+        """See `OpenTerrain.middle_deg`."""
+        return next(((cell.lat_deg + 0.5, cell.lon_deg + 0.5) for cell in self._paths), None)
+
     def covers(self, lat_deg: ArrayLike, lon_deg: ArrayLike) -> Bools:
         """True where a place lies in a block that its file holds (which may still be unknown there)."""
 

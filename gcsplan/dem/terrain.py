@@ -62,6 +62,8 @@ def open_dem(spec: TerrainSpec, *, where: str) -> OpenTerrain:
 class _SourceTerrain:
     """A source, all over the globe; which tiles are needed is known with a mission's area."""
 
+    middle_deg = None
+
     def __init__(self, source: DemSource, spec: TerrainSpec, where: str) -> None:
         self._source, self._spec, self._where = source, spec, where
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import logging
 import math
 import os
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
 from functools import partial
@@ -223,6 +223,12 @@ def read_no_fly(source: str | os.PathLike[str], at: Sequence[str] | None = None)
     return _MissionReading(Content(file, where, raw, written, at=texts_of(at)), KeptWorld()).zones_alone()
 
 
+def zones_by_entry(content: Content, kept: KeptWorld) -> dict[str, Sequence[ZoneDraft]]:
+    """The zones of each entry of ``no_fly`` and ``keep_in``, by its place such as ``no_fly[3]``; mistakes are left for
+    `load_content` to refuse. ``kept``: see there."""
+    return _MissionReading(content, kept).zones_by_entry()
+
+
 class _MissionReading:
     """One pass over one file: the steps in order, and the problems found so far."""
 
@@ -304,6 +310,10 @@ class _MissionReading:
         )  # fmt: skip
         _log.info("%s: %d vehicles, %d zones", self.content.where, len(source.vehicles), len(source.zones))
         return replace(source, wider=partial(site.wider, source), at_level=partial(site.at_level, source))
+
+    def zones_by_entry(self) -> dict[str, Sequence[ZoneDraft]]:
+        """The zones of each entry that can be read, whatever is wrong with others."""
+        return {entry: found for entry, (found, _, _) in self.entries(self._hours())}
 
     def zones_alone(self) -> tuple[list[ZoneDraft], list[Note]]:
         """All zones, far ones and those that are not used too, and the notes on them. Raises InputError."""
@@ -486,6 +496,14 @@ class _MissionReading:
     def _zones(self, hours: Hours | None) -> tuple[list[ZoneDraft], list[ZoneDraft]]:
         """The no-fly zones, and the areas to stay in. A file of ``no_fly`` may have areas, too: a world with holes."""
         drafts: list[ZoneDraft] = []
+        for _, (found, notes, problems) in self.entries(hours):
+            drafts += found
+            self.notes += notes
+            self.problems += problems
+        return apart(uniquely_named(drafts), self.problems)
+
+    def entries(self, hours: Hours | None) -> Iterator[tuple[str, ReadZones]]:
+        """Each entry of ``no_fly`` and ``keep_in``: its place, its zones, notes on them, and mistakes."""
         inline: dict[str, str] = {}
         for key, what in (("no_fly", "zones"), ("keep_in", "areas")):
             value = self.raw.get(key)
@@ -505,11 +523,7 @@ class _MissionReading:
                     self.problems.append(Mistake(f"{at}.name", words))
                 made_of = (one, hours, self.local, self.content.held.get(keys.file or ""))
                 made = partial(self._entry, keys, at, entry, hours, keep_in=key == "keep_in")
-                found, notes, problems = self.kept.zones(at, made_of, made)
-                drafts += found
-                self.notes += notes
-                self.problems += problems
-        return apart(uniquely_named(drafts), self.problems)
+                yield entry, self.kept.zones(at, made_of, made)
 
     def _areas(self, inside: Sequence[ZoneDraft], frame: Frame) -> tuple[KeepIn, ...]:
         try:

@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 
 from gcsplan.arrays import Bools, Floats
-from gcsplan.errors import NoMission, NoMissionReason
+from gcsplan.errors import LimitValues, NoMission, NoMissionReason
 from gcsplan.notes.note import Note
 from gcsplan.planners.budget import Budget
 from gcsplan.world.airspace import Airspace, Legs
@@ -250,6 +250,7 @@ class Refusal(NoMission):
 
     ``place_of``: the object at that place, if the message does not name it.
     ``untried``: another limit, or fewer zones, may help, and none has been tried yet (`with_cures` does so).
+    ``cures``: see `NoMission`.
     """
 
     def __init__(
@@ -260,8 +261,9 @@ class Refusal(NoMission):
         place: tuple[float, float] | None = None,
         place_of: str = "",
         untried: bool = False,
+        cures: tuple[LimitValues, ...] = (),
     ) -> None:
-        super().__init__(message, reason=reason)
+        super().__init__(message, reason=reason, cures=cures)
         self.east_m = None if place is None else float(place[0])
         self.north_m = None if place is None else float(place[1])
         self.place_of = place_of

@@ -65,8 +65,8 @@ FILTER = (
     '<label class="filter" hidden>Filter vehicles <input type="search" placeholder="a name, a verdict, a zone">'
     '<span class="note"></span></label>'
 )
-SCRIPTS = ("base.js", "labels.js", "view.js", "flight.js", "replay.js", "charts.js", "mesh.js", "scene.js",
-           "filter.js", "start.js")  # fmt: skip
+SCRIPTS = ("numbers.js", "base.js", "labels.js", "view.js", "flight.js", "replay.js", "charts.js", "mesh.js",
+           "scene.js", "filter.js", "start.js")  # fmt: skip
 
 
 def render_page(page: Page) -> str:

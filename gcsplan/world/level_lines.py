@@ -13,6 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Indices
+from gcsplan.errors import heed_cancel
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.geometry import hulls
 from gcsplan.world.geometry.limits import Limits
@@ -182,6 +183,7 @@ def _pieces(
     Both surfaces are the ground unless ``of_top``. Every other line is followed backwards, so that one track covers all
     of them: out, home, out again.
     """
+    heed_cancel()
     n = len(starts)
     still = np.hypot(*(ends - starts).T) == 0.0
     if still.any():  # the kernel takes no line of no length: 0.1 mm instead

@@ -41,8 +41,8 @@ class Browser:
         self._read, from_browser = os.pipe()
         flags = [
             "--headless", "--remote-debugging-pipe", f"--user-data-dir={home}", "--no-first-run", "--hide-scrollbars",
-            "--host-resolver-rules=MAP * ~NOTFOUND", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
-            "--disable-dev-shm-usage", "--disable-background-networking", "about:blank",
+            "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1", "--use-angle=swiftshader",
+            "--enable-unsafe-swiftshader", "--disable-dev-shm-usage", "--disable-background-networking", "about:blank",
         ]  # fmt: skip
         if os.geteuid() == 0:
             flags.insert(0, "--no-sandbox")  # Chromium's own sandbox does not start for root
@@ -95,17 +95,18 @@ class Browser:
         return answer["result"].get("value")
 
     def visit(
-        self, file: Path, *, width: int = 1200, height: int = 900, dark: bool = False, phone: bool = False
+        self, page: Path | str, *, width: int = 1200, height: int = 900, dark: bool = False, phone: bool = False
     ) -> None:
-        """Open a page and wait until its script has run and has drawn."""
+        """Open a page, a file or an address of this machine, and wait until its script has run and has drawn."""
+        url = page if isinstance(page, str) else page.as_uri()
         self.ask("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=phone)
         scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
         self.ask("Emulation.setEmulatedMedia", media="screen", features=[scheme])
         self.ask("Page.navigate", url="about:blank")
         self.events.clear()
-        self.ask("Page.navigate", url=file.as_uri())
+        self.ask("Page.navigate", url=url)
         until = time.monotonic() + ANSWER_S
-        loaded = f"location.href === {json.dumps(file.as_uri())} && document.documentElement?.dataset.ready === 'yes'"
+        loaded = f"location.href === {json.dumps(url)} && document.documentElement?.dataset.ready === 'yes'"
         while not self.evaluate(loaded):
             assert time.monotonic() < until, f"the page's script never came to its end: {self.complaints()}"
             time.sleep(0.05)

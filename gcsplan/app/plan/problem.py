@@ -358,8 +358,11 @@ def run_planner(run: Callable[[Problem], Solution], problem: Problem, vehicle: V
 
 def in_degrees(refusal: Refusal, vehicle: Vehicle, world: World) -> NoMission:
     """A planner's refusal for the user: with the vehicle's name, and its place in degrees."""
-    place = ""
+    place, at = "", None
     if refusal.east_m is not None and refusal.north_m is not None:
         lat, lon = (float(x) for x in world.frame.to_degrees(refusal.east_m, refusal.north_m))
-        place = f" ({refusal.place_of + ' ' if refusal.place_of else ''}at {lat:.6f}, {lon:.6f})"
-    return NoMission(f"{vehicle.name}: {refusal.message}{place}", reason=refusal.reason)  # type: ignore[arg-type]
+        place, at = f" ({refusal.place_of + ' ' if refusal.place_of else ''}at {lat:.6f}, {lon:.6f})", (lat, lon)
+    return NoMission(
+        f"{vehicle.name}: {refusal.message}{place}", reason=refusal.reason, vehicle=vehicle.name, at=at,  # type: ignore[arg-type]
+        cures=refusal.cures,
+    )  # fmt: skip

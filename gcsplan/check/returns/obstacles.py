@@ -29,6 +29,7 @@ from gcsplan.check.motion.return_rules import ASIDE_PARTS, RETURN_RULES, at_home
 from gcsplan.check.motion.stopping import circle_home_m
 from gcsplan.check.returns.footprint import ReturnPlaces, Target, places_of_returns
 from gcsplan.check.returns.trace import TINY_M, MissionTrace, TraceParts
+from gcsplan.errors import heed_cancel
 from gcsplan.vehicle import Vehicle
 from gcsplan.world import level_lines
 from gcsplan.world.airspace import Airspace, Legs
@@ -378,6 +379,7 @@ def _climbs(met: level_lines.LevelLines, low: Floats, spare: Floats, climb: floa
 
 def alike_in_width(extra: Floats, which: Indices) -> list[Indices]:
     """Groups of similar width, each in order."""
+    heed_cancel()
     if not len(which):
         return []
     widest = float(extra[which].max())

@@ -88,6 +88,19 @@ def bench_session(
     _tell(bench.run(changes, cancels, memory, seed), bench.report, as_json)
 
 
+@bench_app.command("map", short_help="The map's server: pointer to path.")
+def bench_map(
+    drags: Annotated[int, typer.Option(metavar="N", help="Drags of the goal over 50 places, on each terrain.")] = 8,
+    memory: Annotated[int, typer.Option(metavar="N", help="Moves over which memory is measured [0: none].")] = 0,
+    seed: Annotated[int, typer.Option(metavar="N", help="Seed of missions and drags.")] = 1,
+    as_json: JsonOption = False,
+) -> None:
+    """Measure the server of gcsplan map with 40 and 200 zones, and on a tile of one degree (extra `map`)."""
+    from gcsplan.bench import map as bench
+
+    _tell(bench.run(drags, memory, seed), bench.report, as_json)
+
+
 @bench_app.command("fleet", short_help="A large fleet, from mission file to upload.")
 def bench_fleet(
     vehicles: Annotated[int, typer.Option(metavar="N", help="Vehicles, 2 to 2000.")] = 1000,

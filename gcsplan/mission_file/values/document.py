@@ -67,8 +67,12 @@ class _Writing:
         own = {key.value: (key, value) for key, value in node.value}
         gone = [key for key in own if key in old and key not in new]
         more = [key for key in new if key not in own and (key not in old or old[key] != new[key])]
-        if any(key not in own for key in old if key not in new) or len(gone) > len(more):
+        if any(key not in own for key in old if key not in new):
             return False  # a merged key cannot go
+        if len(gone) > len(more) and (node.flow_style or len(gone) == len(own)):
+            return False
+        if not all(self._remove(own[was]) for was in gone[len(more) :]):
+            return False
         for was, key in zip(gone, more, strict=False):  # a key in another unit
             name, value = own[was]
             self.spans.append((name.start_mark.index, _end(value), f"{key}: {flow(new[key])}"))
@@ -89,8 +93,14 @@ class _Writing:
         """The value of the key ``name`` changes from ``old`` to ``new``."""
         if isinstance(node, yaml.MappingNode) and isinstance(old, dict) and isinstance(new, dict) and node.value:
             return self.mapping(node, old, new)
+        lists = isinstance(old, list) and isinstance(new, list)
+        if isinstance(node, yaml.SequenceNode) and lists and not node.flow_style:
+            mark = len(self.spans)
+            if self._entries(node, old, new):
+                return True
+            del self.spans[mark:]
         if (
-            isinstance(node, yaml.SequenceNode) and isinstance(old, list) and isinstance(new, list)
+            isinstance(node, yaml.SequenceNode) and lists
             and 0 < len(old) <= len(new) and all(_alike(a, b) for a, b in zip(old, new, strict=False))
         ):  # fmt: skip
             return self._sequence(node, old, new)
@@ -112,19 +122,69 @@ class _Writing:
             self._below(node, [f"{' ' * node.start_mark.column}- {flow(value)}" for value in added])
         return True
 
+    def _entries(self, node: yaml.SequenceNode, old: list[Any], new: list[Any]) -> bool:
+        """A block list: entries that go take their lines along, and new ones come behind those that stay."""
+        stays = _staying(old, new)
+        if not stays:
+            return False
+        for k, (inner, was) in enumerate(zip(node.value, old, strict=True)):
+            mark = len(self.spans)
+            now = new[stays[k]] if k in stays else was
+            if k not in stays and not self._remove(inner):
+                return False
+            if now != was and not (isinstance(inner, yaml.MappingNode) and self.mapping(inner, was, now)):
+                self.spans[mark:] = [(inner.start_mark.index, _end(inner), flow(now))]
+        added = new[len(stays) :]
+        if added:
+            lines = [f"{' ' * node.start_mark.column}- {flow(value)}" for value in added]
+            self._below(node.value[max(stays)], lines)
+        return True
+
     def _into_flow(self, node: yaml.CollectionNode, parts: list[str], own: Any) -> None:
         """Behind the last member, or between the brackets of an empty collection."""
         at = _end(node.value[-1]) if own else node.end_mark.index - 1
         self.spans.append((at, at, (", " if own else "") + ", ".join(parts)))
 
-    def _below(self, node: yaml.CollectionNode, lines: list[str]) -> None:
-        """In lines of their own behind the line in which a block ends."""
+    def _remove(self, member: Any) -> bool:
+        """Take out the lines of a member of a block, from that of its key or dash on; a comment above them stays."""
+        name = member[0] if isinstance(member, tuple) else member
+        begin = self.text.rfind("\n", 0, name.start_mark.index) + 1
+        stop = self.text.find("\n", max(_end(member) - 1, begin))
+        self.spans.append((begin, len(self.text) if stop < 0 else stop + 1, ""))
+        before = self.text[begin : name.start_mark.index].strip()
+        return before == ("" if isinstance(member, tuple) else "-")
+
+    def _below(self, node: yaml.Node, lines: list[str]) -> None:
+        """In lines of their own behind the line in which a value ends."""
         end = _end(node)
         if self.text[end - 1 : end] == "\n":  # behind a block of text
             end -= 1
         stop = self.text.find("\n", end)
         stop = len(self.text) if stop < 0 else stop - self.text[:stop].endswith("\r")
         self.spans.append((stop, stop, "".join(self.line_end + line for line in lines)))
+
+
+def _staying(old: list[Any], new: list[Any]) -> dict[int, int]:
+    """The number in ``new`` of each entry of ``old`` that stays: these are the first ones of ``new``, in order.
+
+    An entry stays if it is equal, or has the same name, or if the old and the new name are names of no other entry.
+    """
+    stays: dict[int, int] = {}
+    names, before = [_name(value) for value in new], [_name(value) for value in old]
+    for k, value in enumerate(old):
+        at = len(stays)
+        if at == len(new):
+            break
+        named = isinstance(value, dict) and isinstance(new[at], dict)
+        same = before[k] == names[at] if before[k] in names else names[at] not in before and len(old) <= len(new)
+        if new[at] == value or (named and same):
+            stays[k] = at
+    return stays
+
+
+def _name(value: Any) -> Any:
+    name = value.get("name") if isinstance(value, dict) else None
+    return name if isinstance(name, str) else None
 
 
 def _alike(old: Any, new: Any) -> bool:

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gcsplan.arrays import Floats
-from gcsplan.errors import CheckFailed, GcsplanError, InputError, NoMission
+from gcsplan.errors import CheckFailed, GcsplanError, InputError, LimitValues, NoMission
 from gcsplan.planners.lattice.routes import LatticeSize, Router
 from gcsplan.planners.problem import PlanFunction, Problem, Progress, Refusal
 from gcsplan.planners.profile.track import denser
@@ -271,7 +271,7 @@ def with_cures(
         elif not trials.stopped:
             in_vain.append(lift)
     untried = lifts[len(cures) + len(in_vain) :]
-    words = [bare.message, *(cure.words for cure in cures), *([but] if but and any(c.whole for c in cures) else [])]
+    words = [bare.message, *(cure.words for cure in cures), *([but] if but and any(c.sets for c in cures) else [])]
     if not cures and not untried:
         cures = [_together(trials, lifts)]
         words.append(cures[0].words)
@@ -287,6 +287,7 @@ def with_cures(
         reason="infeasible" if bare.reason == "infeasible" else "not_found",
         place=None if shown is None else shown.place,
         place_of="" if shown is None else shown.place_of,
+        cures=tuple(cure.sets for cure in cures if cure.sets),
     )
 
 
@@ -295,12 +296,13 @@ def with_cures(
 
 @dataclass(frozen=True, slots=True)
 class Cure:
-    """A change that helps, in words for the message, and its place; ``whole``: a whole plan was made with it."""
+    """A change that helps, in words for the message, and its place; ``sets``: limits with which a whole plan was
+    made."""
 
     words: str
     place: tuple[float, float] | None = None
     place_of: str = ""
-    whole: bool = False
+    sets: LimitValues = ()
 
 
 NO_FLY = "the no-fly zones"
@@ -341,7 +343,7 @@ def _ceiling(trials: Trials, path: Floats) -> Cure:
         f"ground at {amsl_m:.1f} m AMSL ({floor_words(limits)})",
         place,
         "that ground",
-        whole=True,
+        sets=(("max_amsl_m", found.value),),
     )
 
 
@@ -376,7 +378,9 @@ def _climbing(trials: Trials, path: Floats) -> Cure:
     raised = [(key, was) for key, was in (("max_climb_deg", up), ("max_descent_deg", down)) if was < found.value]
     would = " and ".join(f"{key} {found.value:g}" for key, _ in raised)
     was = " and ".join(f"{was:g}" for was in dict.fromkeys(was for _, was in raised))
-    return Cure(f"{would} would do {found.words(f'{was} is given')}", whole=True)
+    return Cure(
+        f"{would} would do {found.words(f'{was} is given')}", sets=tuple((key, found.value) for key, _ in raised)
+    )
 
 
 def _steepest_deg(problem: Problem) -> float:
@@ -398,7 +402,9 @@ def _above_ground(trials: Trials, path: Floats) -> Cure:
     found = trials.least("max_agl_m", lambda m: _limited(problem, max_agl_m=m), given, enough, values)
     if found.path is None:
         return Cure(f"without max_agl_m there is a path{found.no_value}")
-    return Cure(f"max_agl_m {found.value:g} would do {found.words(f'{given:g} is given')}", whole=True)
+    return Cure(
+        f"max_agl_m {found.value:g} would do {found.words(f'{given:g} is given')}", sets=(("max_agl_m", found.value),)
+    )
 
 
 def _fewer_zones(trials: Trials, path: Floats) -> Cure:

@@ -30,11 +30,6 @@ function startMap() {
   });
 }
 
-function niceStep(least) {
-  const power = 10 ** Math.floor(Math.log10(least));
-  return [1, 2, 5, 10].map((m) => m * power).find((s) => s >= least * (1 - 1e-9));
-}
-
 const timeStep = (least) => [0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600].find((s) => s >= least) ||
   3600 * Math.ceil(least / 3600);
 

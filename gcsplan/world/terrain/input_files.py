@@ -110,7 +110,7 @@ class FileReading:
         if one not in self._counted:
             self._counted.add(one)
             self._left -= about.st_size
-        return _of_content(path, about)
+        return _of_content(path)
 
     @staticmethod
     def changed(marks: Mapping[str, str]) -> str:
@@ -217,9 +217,20 @@ def states_of(files: Iterable[Path]) -> tuple[tuple[object, ...], ...]:
 
 
 def sha256_of(path: Path) -> str:
-    """SHA-256 of a file's bytes, read in pieces."""
+    """SHA-256 of a file's bytes, read in pieces; of a file that is unchanged since it was read here, the same again."""
     with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+        about = os.fstat(file.fileno())
+        key = (about.st_dev, about.st_ino, about.st_size, about.st_mtime_ns, about.st_ctime_ns)
+        known = known_hashes.get(key)
+        if known is not None:
+            return known
+        began_ns = time.time_ns()
+        found = hashlib.file_digest(file, "sha256").hexdigest()
+    if began_ns - max(about.st_mtime_ns, about.st_ctime_ns) > SETTLED_NS:
+        if len(known_hashes) >= _MOST_KEPT:
+            known_hashes.clear()
+        known_hashes[key] = found
+    return found
 
 
 def sha256_of_all(files: Sequence[Path], first: str | None = None) -> str:
@@ -243,22 +254,11 @@ def _tell(kind: str, path: str | os.PathLike[str]) -> None:
         now.tell(f"{kind} {os.path.abspath(path)}")
 
 
-def _of_content(path: str | Path, about: os.stat_result) -> str:
-    key = (about.st_dev, about.st_ino, about.st_size, about.st_mtime_ns, about.st_ctime_ns)
-    known = known_hashes.get(key)
-    if known is not None:
-        return known
-    began_ns = time.time_ns()
+def _of_content(path: str | Path) -> str:
     try:
-        with open(path, "rb") as file:
-            mark = hashlib.file_digest(file, "sha256").hexdigest()[:_MARK]
+        return sha256_of(Path(path))[:_MARK]
     except OSError as why:
         return f"unreadable {why.errno}"
-    if began_ns - max(about.st_mtime_ns, about.st_ctime_ns) > SETTLED_NS:
-        if len(known_hashes) >= _MOST_KEPT:
-            known_hashes.clear()
-        known_hashes[key] = mark
-    return mark
 
 
 def _of_folder(path: str, suffixes: tuple[str, ...]) -> str:

@@ -127,6 +127,14 @@ class Mosaic:
         self._degrees = to_wgs84(first.crs.horizontal, where=where)
         self._layout(0.0)  # finds tiles off the common grid before anything is read
 
+    @property
+    def middle_deg(self) -> tuple[float, float]:
+        """Latitude and longitude of the first tile's middle, to a few metres."""
+        first = self.rasters[0]
+        x, y = first.west + 0.5 * first.cols * first.dx, first.north - 0.5 * first.rows * first.dy
+        lon, lat = self._degrees.transform(x, y)
+        return float(lat), float(lon)
+
     def covers(self, lat_deg: ArrayLike, lon_deg: ArrayLike) -> Bools:
         """True where a place lies on some tile (which may still be void there); accurate to a few metres."""
         lat, lon = np.broadcast_arrays(np.asarray(lat_deg, float), np.asarray(lon_deg, float))

@@ -98,6 +98,10 @@ class TerrainSpec:
 class OpenTerrain(Protocol):
     """A terrain that has been found and accepted, as far as that is possible before a mission's area is known."""
 
+    @property
+    def middle_deg(self) -> tuple[float, float] | None:
+        """Latitude and longitude of a place in the middle of some tile; None for terrain that is everywhere."""
+
     def covers(self, lat_deg: ArrayLike, lon_deg: ArrayLike) -> Bools:
         """True where a place lies on the terrain (which may still be void there)."""
 
@@ -259,6 +263,10 @@ class _RasterTerrain:
             raster = open_raster(Path(spec.canopy), where=place(where, "canopy"))
             self._canopy = Mosaic([raster], where=place(where, "canopy"))
 
+    @property
+    def middle_deg(self) -> tuple[float, float] | None:
+        return next((s.tiles.middle_deg for s in self._sources if isinstance(s.tiles, Mosaic)), None)
+
     def covers(self, lat_deg: ArrayLike, lon_deg: ArrayLike) -> Bools:
         on = np.full(np.broadcast(lat_deg, lon_deg).shape, self._spec.sea)
         for source in self._sources:
@@ -392,6 +400,8 @@ def _datums(tiles: Sequence[Tiles], spec: TerrainSpec, where: str) -> list[Verti
 
 class _LocalTerrain:
     """Flat ground and peaks: known everywhere."""
+
+    middle_deg = None
 
     def __init__(self, spec: TerrainSpec, where: str) -> None:
         self._spec = spec

@@ -38,6 +38,17 @@ vehicles:
         ("a:\r\n  b: 1\r\nc: 2\r\n", {"a": {"b": 1, "d": 4}, "c": 2}, "a:\r\n  b: 1\r\n  d: 4\r\nc: 2\r\n"),
         ("a:\n  - {b: 1}", {"a": [{"b": 1}, {"b": 2}], "c": 3}, "a:\n  - {b: 1}\n  - {b: 2}\nc: 3"),
         ("a: |\n  text\nb: 1\n", {"a": "text\n", "b": 1, "c": 2}, "a: |\n  text\nb: 1\nc: 2\n"),
+        ("a:\n  - 1  # one\n  - 2\n# end\n", {"a": [2]}, "a:\n  - 2\n# end\n"),
+        ("a:\n- {b: 1}\n- b: 2\n  c: 3\n- 4", {"a": [{"b": 1}, 4]}, "a:\n- {b: 1}\n- 4"),
+        (
+            "a:\n- {name: xx}\n- {name: yy, b: 1}  # y\n",
+            {"a": [{"name": "yy", "c": 2}, {"name": "zz"}]},
+            "a:\n- {name: yy, c: 2}  # y\n- {name: zz}\n",
+        ),
+        ("a:\n- {name: xx}  # x\n", {"a": [{"name": "zz", "b": 1}]}, "a:\n- {name: zz, b: 1}  # x\n"),
+        ("a:\n- {name: xx, b: 1, c: 2}  # x\n", {"a": [{"name": "xx", "d": 1}]}, "a:\n- {name: xx, d: 1}  # x\n"),
+        ("a:\n- 1\n- 2  # two\n", {"a": [1, 3]}, "a:\n- 1\n- 3\n"),
+        ("a:\n  b: 1\n  c: 2  # two\n  d: 3\n", {"a": {"b": 1, "d": 3}}, "a:\n  b: 1\n  d: 3\n"),
         ("b: 1\na: |\n  text\n", {"b": 1, "a": "text\n", "c": 2}, "b: 1\na: |\n  text\nc: 2\n"),
     ],
 )
@@ -59,7 +70,7 @@ def test_comments_and_empty_lines_stay_where_they_are() -> None:
     assert text.splitlines()[text.splitlines().index(BLOCK.splitlines()[6]) + 1] == "  - {center: [3, 4], radius_m: 5}"
 
 
-@pytest.mark.parametrize("text", ["a: 1\nb: 2\n", "base: &b {a: 1}\nc: {<<: *b, d: 1}\n"])
+@pytest.mark.parametrize("text", ["a: {b: 2, c: 1}\n", "base: &b {a: 1}\nc: {<<: *b, d: 1}\n"])
 def test_a_key_that_goes_has_no_place(text: str) -> None:
     new = read_yaml(text, where="")
     inner = new.get("c", new)

@@ -22,7 +22,7 @@ from tests.support.effort import draws
 from tests.support.pages import Reader, fleet_page, small_page
 
 in_node = pytest.mark.skipif(node.PROGRAM is None, reason="no Node is installed")
-SCRIPTS = ("base.js", "flight.js")
+SCRIPTS = ("numbers.js", "base.js", "flight.js")
 
 
 def wavy(seed: int, moments: int, name: str = "uav") -> TimedPath:

@@ -1,0 +1,167 @@
+"""Terrain tiles for the map: the ground that a mission is planned over, as PNG in the terrarium encoding."""
+
+from __future__ import annotations
+
+import io
+import math
+import threading
+from collections import OrderedDict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PIL import Image
+
+from gcsplan.arrays import Floats
+from gcsplan.errors import InputError
+from gcsplan.mission_file.scene import make_spec
+from gcsplan.mission_file.values.errors import read_section
+from gcsplan.mission_file.values.schema import TerrainKeys
+from gcsplan.mission_file.window import opened
+from gcsplan.world.geodesy.frame import FARTHEST_M, Frame
+from gcsplan.world.geometry.surface import Surface
+from gcsplan.world.geometry.zones import Box
+from gcsplan.world.terrain.terrain import OpenTerrain
+
+TILE_PIXELS = 256
+MOST_TILES_BYTES = 32 * 2**20
+"""Most bytes of all tiles that are kept."""
+
+MOST_BLOCKS, BLOCK_CELLS, MOST_CELLS = 3, 3_000_000, 16_000_000
+"""Blocks of ground that are kept; cells of one, if there is a choice; and cells of the ground under one tile."""
+
+BLOCK_ZOOMS = 2
+"""A block is the ground under a tile of this many zooms less, if that has no more cells than it may have."""
+
+LEAST_ZOOM, MOST_ZOOM = 6, 15
+"""Zooms of tiles; beyond, the map draws those of the last one larger."""
+
+MIDDLE_BOX_M = 1000.0
+SEA_OFFSET_M = 32768.0
+"""Terrarium: metres above this far below the sea, as 256ths in red, green and blue."""
+
+
+TileNumber = tuple[int, int, int]
+
+
+class GroundTiles:
+    """The tiles of the terrain that ``section`` names (``terrain:`` of a mission in ``folder``).
+
+    ``frame`` is that of a mission in local metres, whose hills stand in it; None otherwise. Raises InputError for
+    terrain that cannot be opened. May be called from any thread: tiles are made one at a time.
+    """
+
+    def __init__(self, section: Any, folder: Path, frame: Frame | None) -> None:
+        problems: list[Any] = []
+        keys = read_section(TerrainKeys, section, "terrain", problems)
+        if keys is None or problems:
+            raise InputError.of(problems)
+        self.terrain: OpenTerrain = opened(make_spec(keys, folder), where="terrain")
+        self.flat = keys.flat_m is not None and not keys.peaks
+        self._frame = frame
+        self._lock = threading.Lock()
+        self._tiles: OrderedDict[TileNumber, bytes | None] = OrderedDict()
+        self._blocks: OrderedDict[TileNumber, tuple[Frame, Surface, float]] = OrderedDict()
+        self.bounds = self._bounds()
+
+    def _bounds(self) -> list[float] | None:
+        """West, south, east, north in degrees; None for terrain without an edge."""
+        middle = self.terrain.middle_deg
+        if middle is None:
+            return None
+        frame, box = Frame(*middle), (-MIDDLE_BOX_M, -MIDDLE_BOX_M, MIDDLE_BOX_M, MIDDLE_BOX_M)
+        west, south, east, north = self.terrain.around(frame, box).extent(frame, box)
+        corners = np.clip([[west, south], [west, north], [east, south], [east, north]], -FARTHEST_M, FARTHEST_M)
+        degrees = frame.to_degrees(corners[:, 0], corners[:, 1])
+        return [float(degrees[:, 1].min()), float(degrees[:, 0].min()), float(degrees[:, 1].max()),
+                float(degrees[:, 0].max())]  # fmt: skip
+
+    def png(self, z: int, x: int, y: int) -> bytes | None:
+        """The tile as PNG; None where there is no ground, or more than one tile may take."""
+        if not (LEAST_ZOOM <= z <= MOST_ZOOM and 0 <= x < 2**z and 0 <= y < 2**z):
+            return None
+        tile = z, x, y
+        with self._lock:
+            if tile in self._tiles:
+                self._tiles.move_to_end(tile)
+                return self._tiles[tile]
+            made = self._made(tile)
+            self._tiles[tile] = made
+            while sum(len(t or b"") for t in self._tiles.values()) > MOST_TILES_BYTES or len(self._tiles) > 4096:
+                self._tiles.popitem(last=False)
+            return made
+
+    def _made(self, tile: TileNumber) -> bytes | None:
+        block = self._block(tile)
+        if block is None:  # too much ground for one tile is drawn flat
+            return _terrarium(np.zeros((TILE_PIXELS, TILE_PIXELS))) if self._touched(tile) else None
+        frame, surface, lowest_m = block
+        lat, lon = _pixels_deg(tile)
+        plane = frame.to_plane(*np.broadcast_arrays(lat[:, None], lon[None, :]))
+        ground = surface.ground_at(plane[..., 0], plane[..., 1])
+        known = np.isfinite(ground)
+        return _terrarium(np.where(known, ground, lowest_m)) if known.any() or self._touched(tile) else None
+
+    def _touched(self, tile: TileNumber) -> bool:
+        """Whether a tile meets `bounds`: the page requests it then, also where the ground ends on the slant."""
+        if self.bounds is None:
+            return False
+        (south, north), (west, east) = _edges_deg(tile)
+        return self.bounds[0] <= east and west <= self.bounds[2] and self.bounds[1] <= north and south <= self.bounds[3]
+
+    def _block(self, tile: TileNumber) -> tuple[Frame, Surface, float] | None:
+        """The ground under a tile, with much around it if that is not too large."""
+        z, x, y = tile
+        for up in range(min(BLOCK_ZOOMS, z), -1, -1):
+            block = z - up, x >> up, y >> up
+            if block in self._blocks:
+                self._blocks.move_to_end(block)
+                return self._blocks[block]
+        for up in range(min(BLOCK_ZOOMS, z), -1, -1):
+            block = z - up, x >> up, y >> up
+            found = self._loaded(block, BLOCK_CELLS if up else MOST_CELLS)
+            if found is not None:
+                self._blocks[block] = found
+                while len(self._blocks) > MOST_BLOCKS:
+                    self._blocks.popitem(last=False)
+                return found
+        return None
+
+    def _loaded(self, block: TileNumber, most_cells: int) -> tuple[Frame, Surface, float] | None:
+        lat, lon = _edges_deg(block)
+        try:
+            frame = self._frame or Frame(0.5 * (lat[0] + lat[1]), 0.5 * (lon[0] + lon[1]))
+            corners = frame.to_plane([lat[0], lat[0], lat[1], lat[1]], [lon[0], lon[1], lon[0], lon[1]])
+            if not np.isfinite(corners).all() or np.abs(corners).max() > FARTHEST_M:
+                return None
+            box: Box = (*corners.min(axis=0).tolist(), *corners.max(axis=0).tolist())
+            surface = self.terrain.around(frame, box).load(frame, box, most_cells=most_cells)
+        except InputError:
+            return None  # no ground there, or too much
+        return frame, surface, float(np.nanmin(surface.ground_m))
+
+
+def _edges_deg(tile: TileNumber) -> tuple[tuple[float, float], tuple[float, float]]:
+    """South and north, west and east of a tile."""
+    z, x, y = tile
+    return (_lat_deg(y + 1.0, z), _lat_deg(y, z)), (x / 2**z * 360.0 - 180.0, (x + 1) / 2**z * 360.0 - 180.0)
+
+
+def _lat_deg(y: float, z: int) -> float:
+    return math.degrees(math.atan(math.sinh(math.pi * (1.0 - 2.0 * y / 2**z))))
+
+
+def _pixels_deg(tile: TileNumber) -> tuple[Floats, Floats]:
+    """Latitudes from the north and longitudes from the west of a tile's pixels, at their middles."""
+    z, x, y = tile
+    part = (np.arange(TILE_PIXELS) + 0.5) / TILE_PIXELS
+    lat = np.degrees(np.arctan(np.sinh(np.pi * (1.0 - 2.0 * (y + part) / 2**z))))
+    return lat, (x + part) / 2**z * 360.0 - 180.0
+
+
+def _terrarium(heights_m: Floats) -> bytes:
+    whole = np.rint((np.clip(heights_m, -11_000.0, 9_000.0) + SEA_OFFSET_M) * 256.0).astype(np.uint32)
+    colour = np.stack([whole >> 16, whole >> 8 & 255, whole & 255], axis=-1).astype(np.uint8)
+    buffer = io.BytesIO()
+    Image.fromarray(colour).save(buffer, "PNG", compress_level=1)
+    return buffer.getvalue()

@@ -1,0 +1,371 @@
+"""`MapSession`: takes the page's messages in order, edits, plans, and answers; in one thread of its own.
+
+While a point is dragged, a plan runs to its first safe path, and then the newest place counts: the ones between are
+left out. Any other message ends the plan that it supersedes.
+"""
+
+from __future__ import annotations
+
+import queue
+import threading
+import time
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from gcsplan.app.plan.model import Plan
+from gcsplan.app.plan.way_home import home_of, homes_of, is_required
+from gcsplan.app.session import BetterPath
+from gcsplan.check.returns.verdict import WayHome
+from gcsplan.errors import Cancelled, GcsplanError, InputError, Mistake, NoMission, cancelled_by
+from gcsplan.mission_file.kept import KeptWorld
+from gcsplan.mission_file.load import zones_by_entry
+from gcsplan.mission_file.request import Content
+from gcsplan.page import answers
+from gcsplan.page.edits import Edits, terrain_choices
+from gcsplan.page.form import form_of
+from gcsplan.page.ground_tiles import LEAST_ZOOM, MOST_ZOOM, GroundTiles
+from gcsplan.page.history import EditedDocument
+from gcsplan.page.places import read_text, vehicles_of
+from gcsplan.page.refused import PageError
+from gcsplan.page.zone_features import zones_geojson
+from gcsplan.units import SYSTEMS, Units
+from gcsplan.world.geodesy.frame import Frame
+
+PageMessage = dict[str, Any]
+SendAnswer = Callable[[PageMessage], None]
+
+LIVE_S, LIVE_MOST_S = 0.25, 2.0
+"""A live plan that has no path after this many seconds gives way to a newer place; where paths take longer, after up to
+the second number of seconds, so that some come while the pointer moves."""
+
+IDLE_S = 1.0
+"""Seconds between two looks at the disk, and after the last edit until unsaved ones are kept."""
+
+MOST_MESSAGES_WAITING = 1000
+"""Most messages that wait; live ones of one drag are joined."""
+
+SPARE_DEG = 0.01
+"""Degrees around a mission where the map opens."""
+
+
+class _Enough(Exception):
+    """A live plan has its path."""
+
+
+class MapSession:
+    """The state behind one page. ``send`` is called with each answer, from the session's thread."""
+
+    def __init__(self, edits: Edits, units: Units, base: PageMessage | None = None) -> None:
+        self._edits, self._units, self._base = edits, units, base
+        self._send: SendAnswer = lambda answer: None
+        self._waiting: queue.SimpleQueue[PageMessage | None] = queue.SimpleQueue()
+        self._held: PageMessage | None = None
+        self._count = 0
+        self._n = 0
+        self._planning_live: bool | None = None
+        self._begun_s, self._patience_s = 0.0, LIVE_S
+        self._owed = False
+        self._costs: dict[str, float] = {}
+        self._problems: tuple[Mistake, ...] = ()
+        self._zones = KeptWorld()
+        self._names: list[str] = []
+        self._revision = 0
+        self._tiles: GroundTiles | None = None
+        self._tiles_of: Any = None
+        self._disk = edits.store.disk()
+        self._unkept = False
+        self._failed_to_keep = ""
+        self._thread = threading.Thread(target=self._run, name="map session", daemon=True)
+        self._thread.start()
+
+    # -- from the server's thread --------------------------------------------------------------------------------
+
+    def attach(self, send: SendAnswer) -> None:
+        """Send all answers there from now on."""
+        self._send = send
+
+    def hand_in(self, message: PageMessage) -> None:
+        """Take a message of the page, in order. Raises PageError if too many wait."""
+        if self._waiting.qsize() >= MOST_MESSAGES_WAITING:
+            raise PageError("too many messages wait", code="bad_message")
+        self._waiting.put(message)
+        self.hurry()
+
+    def hurry(self) -> None:
+        """End the plan that a waiting message supersedes: at once, but a live one has `LIVE_S` for its path."""
+        live, planner = self._planning_live, self._edits.planner
+        if planner is None or live is None or self._waiting.empty():
+            return
+        if not live or time.monotonic() - self._begun_s > self._patience_s:
+            planner.cancel()
+
+    def tile(self, revision: int, z: int, x: int, y: int) -> bytes | None:
+        """A terrain tile; None if there is none, or another terrain by now."""
+        tiles = self._tiles
+        return None if tiles is None or revision != self._revision else tiles.png(z, x, y)
+
+    def close(self) -> Path | None:
+        """End the session; the file in which unsaved edits are kept, None if all are saved. Raises InputError."""
+        self._waiting.put(None)
+        if self._edits.planner is not None:
+            self._edits.planner.cancel()
+        self._thread.join()
+        return self._edits.store.edits if self._edits.keep() else None
+
+    # -- the session's thread ------------------------------------------------------------------------------------
+
+    def _run(self) -> None:
+        while True:
+            try:
+                message = self._next(IDLE_S)
+            except queue.Empty:
+                self._look_around()
+                continue
+            if message is None:
+                return
+            self._answer(message)
+
+    def _next(self, wait_s: float) -> PageMessage | None:
+        """The next message; of live ones that wait in a row, the last with the changes of all."""
+        if self._held is not None:
+            message, self._held = self._held, None
+        else:
+            found = self._waiting.get(timeout=wait_s)
+            if found is None:
+                return None
+            message = found
+        while _is_live(message):
+            try:
+                after = self._waiting.get_nowait()
+            except queue.Empty:
+                break
+            if after is None or not _is_live(after):
+                if after is None:
+                    self._waiting.put(None)
+                else:
+                    self._held = after
+                break
+            message = after | {"changes": {**message["changes"], **after["changes"]}}
+        return message
+
+    @property
+    def _superseded(self) -> bool:
+        return self._held is not None or not self._waiting.empty()
+
+    def _answer(self, message: PageMessage) -> None:
+        self._n = message["n"]
+        try:
+            plans = self._do(message)
+        except PageError as why:
+            self._send(answers.error_answer(self._n, why, why.code))
+            plans = False
+        except GcsplanError as why:
+            self._problems = why.problems if isinstance(why, InputError) else ()
+            self._send(answers.error_answer(self._n, why, "bad_mission"))
+            self._send_state()
+            plans = False
+        except Exception as why:  # the page must hear of a bug, and the session goes on
+            self._send(answers.error_answer(self._n, GcsplanError(f"a bug of gcsplan: {why!r}"), "internal"))
+            plans = False
+        if (plans or self._owed) and self._edits.planner is not None:
+            self._plan(live=_is_live(message))
+
+    def _do(self, message: PageMessage) -> bool:
+        """Follow a message; whether a plan follows. Raises PageError, InputError."""
+        edits, kind = self._edits, message["type"]
+        if kind == "change":
+            live = _is_live(message)
+            edits.change(message.get("changes"), live=live)
+            if live:
+                return True
+            self._unkept = True
+        elif kind == "place":
+            self._send({"type": "place", "n": self._n, "at": read_text(message.get("text"))})
+            return False
+        elif kind == "save":
+            file = edits.save(message.get("name"), over=message.get("over") is True)
+            self._disk = edits.store.disk()
+            self._unkept = False
+            self._send({"type": "saved", "n": self._n, "file": file.name})
+            self._send_state()
+            return False
+        elif kind == "units":
+            if message.get("units") not in SYSTEMS:
+                raise PageError(f"units are {', '.join(SYSTEMS)}", code="bad_message", where="units")
+            self._units = SYSTEMS[message["units"]]
+        elif kind in ("new", "undo", "redo", "cancel", "reload"):
+            if kind == "new":
+                edits.begin(message)
+            else:
+                getattr(edits, kind)()
+            self._disk = edits.store.disk()
+            self._unkept = True
+        elif kind == "hello":
+            edits.cancel()  # a page that comes again has dropped what it dragged
+        else:
+            raise PageError("this type of message is not known", code="bad_message", where="type")
+        self._problems = ()
+        self._send_state()
+        return True
+
+    def _look_around(self) -> None:
+        """While nothing else happens: keep unsaved edits, and look whether the file changed."""
+        if self._unkept:
+            self._unkept = False
+            try:
+                self._edits.keep()
+            except InputError as why:
+                if str(why) != self._failed_to_keep:
+                    self._failed_to_keep = str(why)
+                    self._send(answers.error_answer(self._n, why, "not_saved"))
+        disk = self._edits.store.disk()
+        if disk != self._disk:
+            self._disk = disk
+            self._send_state()
+
+    # -- plans ---------------------------------------------------------------------------------------------------
+
+    def _plan(self, *, live: bool) -> None:
+        edits, planner, n = self._edits, self._edits.planner, self._n
+        assert planner is not None
+        self._costs.clear()
+        self._begun_s = time.monotonic()
+        begun_s = time.perf_counter()
+        seen: set[str] = set()
+        names = self._names
+
+        def on_path(found: BetterPath) -> None:
+            if live and found.vehicle in seen:
+                return
+            first = found.vehicle not in seen
+            seen.add(found.vehicle)
+            self._costs[found.vehicle] = found.cost
+            self._send(answers.path_answer(n, names.index(found.vehicle), found, live=live, first=first))
+            if live and len(seen) == len(names):
+                raise _Enough
+
+        def on_bound(vehicle: str, bound: float) -> None:
+            if not live:
+                cost = self._costs.get(vehicle)
+                self._send(answers.bound_answer(n, names.index(vehicle), bound, cost))
+
+        self._planning_live, self._owed = live, not live
+        try:
+            if self._superseded and not live:
+                return  # what is owed, comes after the message that waits
+            plan = planner.plan(dict(edits.live) if live else None, on_path=on_path, on_bound=on_bound)
+            self._planning_live = None
+            self._send_plan(n, plan, time.perf_counter() - begun_s)
+            self._owed = False
+        except _Enough:
+            self._patience_s = min(max(LIVE_S, 3.0 * (time.monotonic() - self._begun_s)), LIVE_MOST_S)
+        except Cancelled:
+            self._patience_s = min(2.0 * self._patience_s, LIVE_MOST_S)
+        except NoMission as why:
+            self._owed = False
+            self._send(answers.refused_answer(n, why, planner.mission, self._units, live=live))
+        except InputError as why:
+            self._owed = False
+            if not live:
+                self._problems = why.problems
+                self._send_state()
+            self._send(answers.error_answer(n, why, "bad_mission"))
+        except Exception as why:  # the page must hear of a bug, and the session goes on
+            self._owed = False
+            self._send(answers.error_answer(n, GcsplanError(f"a bug of gcsplan: {why!r}"), "internal"))
+        finally:
+            self._planning_live = None
+
+    def _send_plan(self, n: int, plan: Plan, elapsed_s: float) -> None:
+        """Send the certificate, then the way home, which is judged before it if the mission requires a safe one."""
+        required = is_required(plan.source, option=False)
+        homes = homes_of(plan) if required else {}
+        self._send(answers.plan_answer(n, plan, homes, self._units, elapsed_s))
+        if required:
+            return
+        with suppress(Cancelled), cancelled_by(lambda: self._superseded):
+            found: dict[str, WayHome] = {
+                v.name: home_of(v.verdict, v.request, plan.world, plan.source.terrain_error_m) for v in plan.vehicles
+            }
+            self._send(answers.home_answer(n, plan, found, self._units))
+
+    # -- the state -----------------------------------------------------------------------------------------------
+
+    def _send_state(self) -> None:
+        self._send(self.state())
+
+    def state(self) -> PageMessage:
+        """The page's whole state."""
+        edits = self._edits
+        document = edits.document
+        frame = _frame_of(document)
+        self._find_tiles(document, frame)
+        vehicles = vehicles_of(document, frame)
+        self._names = [v["name"] for v in vehicles]
+        where = str(edits.store.place)
+        entries: dict[str, Any] = {}
+        with suppress(InputError):
+            entries = dict(zones_by_entry(Content(edits.store.place, where, document, None), self._zones))
+        file = edits.store.file
+        return {
+            "type": "state", "n": self._n, "stage": edits.stage, "name": str(document.get("name", "")),
+            "file": None if file is None else file.name, "saved": edits.is_saved, "disk": self._disk,
+            "restored": edits.restored, "undo": edits.can_undo, "redo": edits.can_redo,
+            "files": terrain_choices(edits.store.folder), "base": self._base,
+            "units": {"name": self._units.name, "systems": list(SYSTEMS), "kinds": self._units.as_dict()},
+            "bounds": _bounds_of(vehicles) or (self._tiles.bounds if self._tiles is not None else None),
+            "terrain": self._terrain(), "vehicles": vehicles,
+            "zones": zones_geojson(document, entries, frame, self._units),
+            "counts": {key: len(document.get(key) or ()) for key in ("no_fly", "keep_in")},
+            "form": form_of(document, self._problems) if edits.stage == "mission" else [],
+            "problems": [{"where": p.where.rpartition(": ")[2], "message": p.message} for p in self._problems],
+        }  # fmt: skip
+
+    def _find_tiles(self, document: EditedDocument, frame: Frame | None) -> None:
+        """Open the terrain for tiles where it is another one than before."""
+        section = document.get("terrain")
+        named = section, None if frame is None else (frame.lat_deg, frame.lon_deg)
+        if named == self._tiles_of:
+            return
+        self._revision += 1
+        self._tiles_of = named
+        self._tiles = None
+        if section is not None:
+            with suppress(InputError):  # what is wrong with the terrain, the plan says
+                self._tiles = GroundTiles(section, self._edits.store.folder, frame)
+
+    def _terrain(self) -> PageMessage | None:
+        tiles = self._tiles
+        if tiles is None:
+            return None
+        return {
+            "tiles": f"terrain/{self._revision}/{{z}}/{{x}}/{{y}}.png", "bounds": tiles.bounds, "minzoom": LEAST_ZOOM,
+            "maxzoom": MOST_ZOOM, "flat": tiles.flat,
+        }  # fmt: skip
+
+
+def _is_live(message: Mapping[str, Any]) -> bool:
+    return message.get("live") is True and message["type"] == "change" and isinstance(message.get("changes"), dict)
+
+
+def _frame_of(document: EditedDocument) -> Frame | None:
+    """The frame of a mission in local metres; None for one in degrees."""
+    given = document.get("frame")
+    if not isinstance(given, dict):
+        return None
+    try:
+        lat, lon = given["origin"]
+        return Frame(float(lat), float(lon))
+    except (KeyError, TypeError, ValueError, InputError):
+        return None
+
+
+def _bounds_of(vehicles: list[PageMessage]) -> list[float] | None:
+    """West, south, east, north around all places of the vehicles."""
+    places = [p for v in vehicles for p in (v["start"], v["goal"], *v["via"]) if p is not None]
+    if not places:
+        return None
+    lat, lon = [p[0] for p in places], [p[1] for p in places]
+    return [min(lon) - SPARE_DEG, min(lat) - SPARE_DEG, max(lon) + SPARE_DEG, max(lat) + SPARE_DEG]

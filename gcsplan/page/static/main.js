@@ -1,0 +1,41 @@
+// The page to plan on: each part starts on its own, and the connection last.
+import { byId } from './dom.js';
+import { on } from './hub.js';
+import { connect } from './link.js';
+import { banner, startBar } from './bar.js';
+import { startFromNothing } from './start.js';
+import { startGrips } from './grips.js';
+import { startLimits } from './limits.js';
+import { showState, startMap } from './map.js';
+import { startModes } from './modes.js';
+import { startPlaces } from './places.js';
+import { startProfile } from './profile.js';
+import { startResult } from './result.js';
+import { startRoute } from './route.js';
+import { startShapes } from './shapes.js';
+import { startZoneList } from './zonelist.js';
+import { startZones } from './zones.js';
+
+function start() {
+  startBar();
+  try {
+    startMap();
+  } catch (error) {
+    banner('map', `The map needs WebGL, which this browser does not offer: ${error.message}`, [], 'bad');
+    return;
+  }
+  startShapes();
+  startGrips();
+  startModes();
+  startRoute();
+  startZones();
+  startProfile();
+  const panel = byId('panel'), parts = [startResult(), startPlaces(), startZoneList(), startLimits()];
+  on('state', (state) => { if (state.stage !== 'empty' && !panel.contains(parts[0])) panel.replaceChildren(...parts); });
+  startFromNothing(panel);
+  showState();
+  connect();
+  on('state', () => { document.documentElement.dataset.ready = 'yes'; });
+}
+
+start();

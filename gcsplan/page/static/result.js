@@ -1,0 +1,164 @@
+// The result: the verdict, the gap that counts down, the figures; or why there is no mission, and what would do.
+import { button, byId, el } from './dom.js';
+import { known, on, tell } from './hub.js';
+import { holding } from './grips.js';
+import { change } from './link.js';
+import { goTo } from './map.js';
+import { agePath, clearPath, drawNoHome, drawPath, markPlace } from './shapes.js';
+
+const LOOK = { safe: ['safe', '✓'], violations: ['unsafe', '✕'], 'not judged': ['unjudged', '?'] };
+let box = null;
+let current = null; // the plan that is shown as the verdict on the mission as it is now
+let before = []; // the answers of the newest mission: a change that is refused as a whole brings them back
+
+export function startResult() {
+  box = el('section', { id: 'result', 'aria-label': 'Result' },
+    el('div', { class: 'verdict', id: 'verdict', role: 'status' }), el('div', { id: 'gap', hidden: true }), el('div', { id: 'rest' }));
+  on('path', path);
+  on('bound', (message) => showGap(message.gap_percent));
+  on('plan', plan);
+  on('home', home);
+  on('refused', refused);
+  on('asked', () => { current = null; planning(); });
+  on('dragged', () => { if (current) { agePath(); follows(); } });
+  on('error', (message) => {
+    if (message.code === 'bad_mission') nothing(message.message, 'The mission has a mistake');
+    if (message.code === 'bad_change') for (const answer of before) ({ plan, home, refused })[answer.type](answer);
+  });
+  on('connection', (now) => { if (now !== 'open') nothing('The result below may be old.', 'Not connected'); });
+  on('state', (state) => {
+    if (state.stage === 'mission') { if (!known.plan) planning(); return; }
+    clearPath();
+    drawNoHome([]);
+    markPlace(null);
+    known.plan = null;
+    tell('judged', null);
+    byId('rest')?.replaceChildren();
+    showGap(null);
+    verdict('unjudged', '1', 'Start and goal', 'Click both on the map, or type them below.');
+  });
+  return box;
+}
+
+const planning = () => verdict('unjudged', '…', 'Planning', 'The mission is planned and judged.');
+
+function verdict(look, sign, word, words) {
+  const made = byId('verdict') || box.querySelector('.verdict'), text = [look, word, words].join('\n');
+  if (made.dataset.text === text) return; // a reader of the screen hears it once
+  made.dataset.text = text;
+  made.className = `verdict ${look}`;
+  made.replaceChildren(el('span', { class: 'sign', 'aria-hidden': 'true' }, sign), el('div', {}, el('strong', {}, word), el('p', {}, words)));
+}
+
+function showGap(percent) {
+  const made = box.querySelector('#gap');
+  made.hidden = percent === null || percent === undefined;
+  if (made.hidden) return;
+  const text = `No path is more than ${num(percent, percent < 0.095 ? 2 : 1)}${'\u202f'}% shorter`;
+  made.replaceChildren(el('span', {}, text), el('meter', { min: 0, max: 20, low: 1, value: Math.min(20, percent), 'aria-label': 'Gap, percent' }));
+}
+
+function follows() {
+  current = null;
+  showGap(null);
+  verdict('unjudged', '…', 'A path follows', 'It is not judged yet: release the point.');
+}
+
+function path(message) {
+  current = null;
+  drawPath(message.vehicle, message.line, 'draft');
+  drawNoHome([]);
+  markPlace(null);
+  byId('below').classList.add('old');
+  box.querySelector('#rest').classList.add('old');
+  if (message.live || holding()) {
+    follows();
+  } else {
+    showGap(message.gap_percent);
+    verdict('unjudged', '…', 'A path is found', 'The bound tightens; the mission is not judged yet.');
+  }
+}
+
+function plan(message) {
+  current = message;
+  before = [message];
+  clearPath();
+  for (const v of message.vehicles) {
+    drawPath(v.vehicle, v.line, { safe: 'judged', violations: 'unsafe' }[v.verdict] || 'draft');
+  }
+  drawNoHome(message.vehicles.flatMap((v) => (v.way_home ? v.way_home.unsafe : [])));
+  markPlace(null);
+  judged(message.verdict, message.vehicles.map((v) => v.way_home), message.headline);
+  showGap(null);
+  const rest = box.querySelector('#rest');
+  rest.classList.remove('old');
+  rest.replaceChildren(...message.vehicles.flatMap((v) => ofVehicle(v, message.vehicles.length > 1)),
+    ...[list('Left out', (message.left_out || []).map((l) => `${l.name}: ${l.message}`), true), list('Notes on all', message.notes || [], false)].filter((p) => p));
+  tell('judged', message);
+}
+
+// A mission is called safe with all its returns; before they are judged, or where one is unsafe, its path alone is.
+function judged(word, homes, words) {
+  const [look, sign] = LOOK[word] || LOOK['not judged'], returns = homes.every((home) => home && home.safe === true);
+  if (word !== 'safe' || returns) verdict(look, sign, word, words);
+  else if (homes.some((home) => home && home.safe !== true)) verdict('unjudged', '!', 'path safe', words);
+  else verdict(look, sign, 'path safe', words);
+}
+
+function ofVehicle(v, many) {
+  const rows = v.figures.filter((f) => f.key !== 'verdict').map(figure);
+  if (!v.way_home) rows.push(el('div', { 'data-home': v.vehicle }, el('dt', {}, 'Way home'), el('dd', {}, 'being judged')));
+  return [many ? el('h3', {}, v.name) : null, el('dl', {}, ...rows), list('Findings', v.findings, true), list('Not judged', v.not_judged || [], true),
+    homeWords(v.vehicle, v.way_home), list('Notes', v.notes, false)].filter((p) => p);
+}
+
+const list = (name, items, open) => (items.length ? el('details', { open }, el('summary', {}, `${name} (${items.length})`), el('ul', {}, ...items.map((i) => el('li', {}, i)))) : null);
+
+function figure(f) {
+  return el('div', { class: f.bad ? 'bad' : null, 'data-key': f.key }, el('dt', {}, f.label),
+    el('dd', {}, f.at ? button(f.text, () => { goTo(f.at); markPlace(f.at, f.label); }, { class: 'spot', title: 'Show the place on the map' }) : f.text));
+}
+
+// -- the way home: its judgement comes after the mission's ------------------------------------------------------------
+
+const homeWords = (vehicle, way) => el('p', { class: `bare${way && way.unsafe.length ? ' bad' : ''}`, id: `home-${vehicle}`, hidden: !way || way.safe === true || !way.text }, way ? way.text : '');
+
+function home(message) {
+  if (!current || current.n !== message.n) return;
+  before = [current, message];
+  judged(current.verdict, current.vehicles.map((v) => message.vehicles.find((h) => h.vehicle === v.vehicle)?.way_home), message.headline);
+  drawNoHome(message.vehicles.flatMap((v) => (v.way_home ? v.way_home.unsafe : [])));
+  for (const v of message.vehicles) {
+    const row = box.querySelector(`[data-home="${v.vehicle}"]`);
+    if (row && v.figure) row.replaceWith(figure(v.figure)); else row?.remove();
+    if (v.way_home) byId(`home-${v.vehicle}`)?.replaceWith(homeWords(v.vehicle, v.way_home));
+  }
+}
+
+// -- no mission -------------------------------------------------------------------------------------------------------
+
+function nothing(words, word) {
+  current = null;
+  agePath();
+  drawNoHome([]);
+  byId('below').classList.add('old');
+  box.querySelector('#rest').classList.add('old');
+  showGap(null);
+  verdict('unsafe', '✕', word, words);
+}
+
+function refused(message) {
+  if (!message.live) before = [message];
+  nothing(message.message, message.live ? 'No path here' : 'No mission');
+  markPlace(message.at, message.zone || 'here');
+  if (message.live) return;
+  const rest = box.querySelector('#rest');
+  rest.classList.remove('old');
+  rest.replaceChildren(
+    ...(message.at ? [el('p', {}, button('Show the place', () => goTo(message.at), { class: 'wide' }))] : []),
+    ...(message.cures.length ? [el('h3', {}, 'These would do'), ...message.cures.map(cure)] : []));
+}
+
+function cure(given) {
+  return el('div', { class: 'cure' }, button(given.label, () => change(given.changes), { class: 'main' }), given.text ? el('p', { class: 'note' }, given.text) : null);
+}

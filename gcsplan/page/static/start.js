@@ -1,0 +1,102 @@
+// Start from nothing: the ground, the vehicle and the legal ceiling are chosen; then start and goal are clicked.
+import { button, byId, el, refill } from './dom.js';
+import { on } from './hub.js';
+import { send, step } from './link.js';
+import { canvas, goTo } from './map.js';
+import { enter } from './modes.js';
+
+const PRESETS = [['copter', 'Copter, ArduPilot'], ['wing', 'Fixed wing, ArduPilot'], ['px4', 'Copter, PX4']];
+const OFTEN = { m: 120, ft: 400 }; // the ceiling above ground that most laws have
+const CLOSE = 13; // zoom at which a place is shown that was typed
+
+let form = null, asking = 0, draft = null, symbol = 'm', unit_m = 1;
+
+export function startFromNothing(panel) {
+  on('state', (state) => {
+    if (state.stage === 'empty' && (!form || symbol !== state.units.kinds.height[0])) show(panel, state);
+    if (state.stage !== 'empty') form = null;
+    if (state.stage === 'draft' && draft !== state.name) { draft = state.name; begin(state); }
+    if (state.stage === 'mission') draft = null;
+  });
+  on('place', (message) => { if (message.n === asking) found(message.at); });
+  on('error', (message) => {
+    if (!form || (message.n !== asking && message.where !== 'place')) return;
+    complain('start-place', message.message);
+  });
+}
+
+function begin(state) {
+  const vehicle = state.vehicles[0];
+  if (!vehicle || !vehicle.start) enter('start'); else if (!vehicle.goal) enter('goal');
+  if (!byId('stop')) return;
+  canvas().focus({ preventScroll: true });
+}
+
+const radio = (group, value, words, on) => el('label', { class: 'choice' },
+  el('input', { type: 'radio', name: group, value, onchange: on }), el('span', {}, words));
+
+function show(panel, state) {
+  [symbol, unit_m] = state.units.kinds.height;
+  const files = state.files.length
+    ? el('select', { id: 'start-file', 'aria-label': 'Terrain file', onchange: () => pick('ground', 'file') }, ...state.files.map((f) => el('option', {}, f))) : null;
+  form = el('form', { id: 'start', onsubmit: submit, novalidate: true },
+    el('h2', {}, 'New mission'),
+    el('p', { class: 'note' }, 'Choose, then click start and goal on the map. Nothing leaves this machine.'),
+    el('fieldset', {}, el('legend', {}, 'Ground'),
+      radio('ground', 'sample', 'Sample: Jacksboro, Tennessee'),
+      el('div', { class: 'with' }, radio('ground', 'flat', 'Flat, at'), number('start-flat', '0', `Height of the flat ground, ${symbol} above sea level`, 'ground', 'flat'), el('span', {}, `${symbol} above the sea`)),
+      files ? el('div', { class: 'with' }, radio('ground', 'file', 'File'), files)
+        : el('p', { class: 'note' }, 'A terrain file (.tif, .vrt, .hgt, .asc) in the folder of the mission appears here.'),
+      problem('ground')),
+    el('fieldset', {}, el('legend', {}, 'Vehicle'), ...PRESETS.map(([value, words]) => radio('preset', value, words)), problem('preset')),
+    el('fieldset', {}, el('legend', {}, 'Legal ceiling above ground'),
+      el('div', { class: 'with' }, radio('ceiling', 'metres', 'At most'), number('start-ceiling', String(OFTEN[symbol] || OFTEN.m), `Legal ceiling, ${symbol} above ground`, 'ceiling', 'metres'), el('span', {}, symbol)),
+      radio('ceiling', 'none', 'None applies'), problem('ceiling')),
+    el('details', {}, el('summary', {}, 'Show a place first'),
+      el('div', { class: 'with' }, el('input', { id: 'start-place', type: 'text', 'aria-label': 'Place', 'aria-describedby': 'start-place-problem', placeholder: '36.6175, -84.3892', autocomplete: 'off', onkeydown: enterFinds }),
+        button('Show', find, { id: 'start-find' })),
+      el('p', { class: 'note' }, 'Degrees, degrees with minutes and seconds, UTM, or MGRS.'), problem('start-place')),
+    el('p', {}, el('button', { type: 'submit', class: 'main wide', id: 'begin' }, 'Click start and goal')));
+  refill(panel, form);
+  form.querySelector('[value=copter]').checked = true;
+}
+
+const number = (id, value, label, group, choice) => el('input', { id, type: 'number', value, step: 'any', inputmode: 'decimal', 'aria-label': label, oninput: () => pick(group, choice), onfocus: () => pick(group, choice) });
+const problem = (name) => el('p', { class: 'problem', id: `${name}-problem`, role: 'alert', hidden: true });
+const pick = (group, value) => { form.querySelector(`[name=${group}][value=${value}]`).checked = true; };
+
+function complain(name, words) {
+  const box = byId(`${name}-problem`);
+  box.textContent = words;
+  box.hidden = !words;
+}
+
+function enterFinds(event) {
+  if (event.key !== 'Enter') return;
+  event.preventDefault();
+  find();
+}
+
+function find() {
+  complain('start-place', '');
+  const text = byId('start-place').value.trim();
+  if (text) asking = send({ type: 'place', text });
+}
+
+function found(at) {
+  goTo(at, CLOSE);
+  complain('start-place', '');
+}
+
+function submit(event) {
+  event.preventDefault();
+  const chosen = (name) => (form.querySelector(`[name=${name}]:checked`) || {}).value;
+  const ground = chosen('ground'), ceiling = chosen('ceiling'), metres = Number((Number(byId('start-ceiling').value) * unit_m).toPrecision(12));
+  const height = byId('start-flat').value;
+  complain('ground', !ground ? 'Choose the ground: it is never assumed.' : ground === 'flat' && height === '' ? 'Give the height of the flat ground.' : '');
+  complain('ceiling', !ceiling ? 'Choose: the law of the place decides.' : ceiling === 'metres' && !(metres > 0) ? 'Give a height above 0.' : '');
+  const wrong = form.querySelector('.problem:not([hidden])');
+  if (wrong) { const field = wrong.closest('fieldset, details').querySelector('input'); field.focus(); return; }
+  const terrain = { sample: { dem: 'sample:jacksboro' }, flat: { flat_m: Number((Number(height) * unit_m).toPrecision(12)) }, file: { dem: (byId('start-file') || {}).value } }[ground];
+  step({ type: 'new', terrain, preset: chosen('preset'), max_agl_m: ceiling === 'none' ? null : metres, min_agl_m: Math.min(60, ceiling === 'none' ? 60 : metres / 2), start: null, goal: null });
+}

@@ -1,0 +1,81 @@
+"""The zones of a mission's document as GeoJSON for the map, whatever is wrong elsewhere in it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from gcsplan.arrays import Floats
+from gcsplan.errors import InputError
+from gcsplan.export.rows import outlines_deg
+from gcsplan.mission_file.zones.draft import ZoneDraft, place_zones
+from gcsplan.page.history import EditedDocument
+from gcsplan.report.views.plan import zone_heights
+from gcsplan.units import Units
+from gcsplan.world.geodesy.frame import Frame
+
+ZONE_BOUNDS = ("floor", "ceiling")
+
+
+def zones_geojson(
+    document: EditedDocument, entries: Mapping[str, Sequence[ZoneDraft]], frame: Frame | None, units: Units
+) -> dict[str, Any]:
+    """A FeatureCollection: each zone with the key of its entry, and what the page needs to edit it.
+
+    ``entries`` as of `zones_by_entry`; ``frame`` is that of a mission in local metres.
+    """
+    features = []
+    for key, draft in ((key, draft) for key, drafts in entries.items() for draft in drafts):
+        if draft.local and frame is None:
+            continue
+        plane = frame or Frame(*_middle(draft))
+        try:
+            placed, _ = place_zones([replace(draft, keep_in=False, holes=(), unused=None)], plane)
+        except InputError:
+            continue  # its mistake is among the mission's problems
+        zones = [zone for _, zone in placed]
+        rings = outlines_deg(zones, plane)
+        if rings:
+            about = _about(key, entry_of(document, key), draft, zone_heights(zones[0], units))
+            features.append({"type": "Feature", "geometry": _geometry(rings), "properties": about})
+    return {"type": "FeatureCollection", "features": features}
+
+
+def _middle(draft: ZoneDraft) -> tuple[float, float]:
+    lat = [p[0] for p in draft.points]
+    lon = [p[1] for p in draft.points]
+    return 0.5 * (min(lat) + max(lat)), (0.5 * (min(lon) + max(lon)) + 180.0) % 360.0 - 180.0
+
+
+def _geometry(rings: Sequence[Floats]) -> dict[str, Any]:
+    closed = [[[[round(lon, 7), round(lat, 7)] for lat, lon in [*ring.tolist(), ring[0].tolist()]]] for ring in rings]
+    if len(closed) == 1:
+        return {"type": "Polygon", "coordinates": closed[0]}
+    return {"type": "MultiPolygon", "coordinates": closed}
+
+
+def entry_of(document: EditedDocument, key: str) -> Any:
+    """The value of an entry such as ``no_fly[3]``."""
+    name, _, number = key.rstrip("]").partition("[")
+    return document[name][int(number)]
+
+
+def _about(key: str, entry: Any, draft: ZoneDraft, levels: str) -> dict[str, Any]:
+    """The properties of a zone: its entry's values if the entry is the zone itself, and no file of several."""
+    own = isinstance(entry, dict) and "file" not in entry and not draft.local
+    shape = "file"
+    if own:
+        shape = "circle" if "center" in entry else "polygon" if "polygon" in entry else "line"
+    return {
+        "key": key, "name": draft.name, "kind": "keep_in" if draft.keep_in else "no_fly",
+        "editable": bool(own and shape in ("circle", "polygon")), "shape": shape, "levels": levels,
+        "center": list(draft.points[0]) if shape == "circle" else None,
+        "radius_m": draft.radius_m if shape == "circle" else None,
+        "polygon": [list(p) for p in draft.points] if shape == "polygon" else None,
+        **{bound: _bound(entry, bound) if own else None for bound in ZONE_BOUNDS},
+    }  # fmt: skip
+
+
+def _bound(entry: dict[str, Any], bound: str) -> dict[str, Any] | None:
+    return {key: value for key, value in entry.items() if str(key).startswith(f"{bound}_")} or None
