@@ -227,8 +227,8 @@ def _pieces(
     """The line of each piece, the distance along it at which the piece begins, and bounds of the surface there.
 
     The bounds (P,): the lowest ground within the first reach, the highest top within the second and the third; NaN
-    where it is not known; any number for a reach that is `UNUSED`. Both surfaces are the ground unless ``of_top``. Every other line is followed backwards, so that one track covers all
-    of them: out, home, out again.
+    where it is not known; any number for a reach that is `UNUSED`. Both surfaces are the ground unless ``of_top``.
+    Every other line is followed backwards, so that one track covers all of them: out, home, out again.
     """
     heed_cancel()
     n = len(starts)

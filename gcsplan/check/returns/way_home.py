@@ -6,7 +6,8 @@ with the kernels and margins of the exact check (`gcsplan.world.level_lines`), a
 that the returns sweep. Nothing is sampled, so a point reported as safe is safe. A point reported as unsafe is unsafe,
 except: at the ends of a stretch (`refinement.SMALLEST_PART_M`), in safe gaps within a stretch that are shorter than
 `COARSE_M` (`COARSEST_M` on long missions), and for what the bounds of the ground beside a line cost: the widening times
-the slope there, and half a piece more on long missions over fine cells (`level_lines.step_of`). Apart from that the lowest altitude is at most `LEVEL_M` too high.
+the slope there, and half a piece more on long missions over fine cells (`level_lines.step_of`). Apart from that the
+lowest altitude is at most `LEVEL_M` too high.
 
 `lowest_agl`: the lowest height of the returns above ground, at one return altitude. It counts from the ground and what
 stands on it, within the track error of where a return is, at the altitudes that the autopilot may fly; the altitude
