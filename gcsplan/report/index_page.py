@@ -94,7 +94,8 @@ def _map(
     image = f'{image}preserveAspectRatio="none"/>' if picture else ""
     return (
         f'<svg id="tracks" viewBox="{box}" role="img" aria-label="all tracks, north up">{image}{"".join(parts)}</svg>'
-        f'<p class="note">North is up; the map is {num(wide / scale * METRES_PER_DEGREE, 1, units.far)} wide. {words}</p>'
+        f'<p class="note">North is up; the map is {num(wide / scale * METRES_PER_DEGREE, 1, units.far)} wide. '
+        f"{words}</p>"
     )
 
 

@@ -294,7 +294,7 @@ class Airspace:
         return self.around(sign, points, reach_m, held, of_top=sign > 0.0).reshape(e.shape)
 
     def around(self, sign: float, points: Floats, reach_m: float, held: Held, *, of_top: bool) -> Floats:
-        """(N,) an upper bound of ``sign`` times the top's or ground's height within reach of points (N, 2); NaN: unknown.
+        """(N,) an upper bound of ``sign`` times the height of top or ground within reach of points (N, 2); NaN: none.
 
         ``held``: `extrema_along` lines through the points, for that reach or a wider one.
         """

@@ -251,7 +251,7 @@ class GroundPatch:
         return cls(box_deg, packed(ground, float(np.nanmin(ground)), float(np.nanmax(ground))))
 
     def at(self, lat_deg: Floats, lon_deg: Floats) -> Floats:
-        """(rows, cols) heights AMSL, m, over latitudes (rows,) and longitudes (cols,); NaN beyond the box or unknown."""
+        """(rows, cols) heights AMSL, m, over latitudes (rows,) and longitudes (cols,); NaN outside or unknown."""
         one, (south, west, north, east) = self.heights, self.box_deg
         whole = np.frombuffer(base64.b64decode(str(one["heights"])), "<u2").reshape(one["rows"], one["cols"])
         ground = np.where(whole == one["unknown"], np.nan, one["base"] + one["step"] * whole)
@@ -260,5 +260,5 @@ class GroundPatch:
         j, i = (np.clip(np.floor(a), 0, n - 2).astype(int) for a, n in zip((y, x), ground.shape, strict=True))
         v, u = (y - j)[:, None], (x - i)[None]
         left, right = ((1.0 - v) * ground[np.ix_(j, k)] + v * ground[np.ix_(j + 1, k)] for k in (i, i + 1))
-        inside = ((0.0 <= y) & (y <= ground.shape[0] - 1.0))[:, None] & (0.0 <= x) & (x <= ground.shape[1] - 1.0)
+        inside = ((y >= 0.0) & (y <= ground.shape[0] - 1.0))[:, None] & (x >= 0.0) & (x <= ground.shape[1] - 1.0)
         return np.where(inside, (1.0 - u) * left + u * right, np.nan)
