@@ -258,7 +258,7 @@ def plan(
     except UsageError:
         raise  # a mistake on the command line does not invalidate an earlier mission
     except (InputError, NoMission, CheckFailed):
-        _retire(directory, None if as_json else source)
+        _retire(directory, None if as_json else source, system)
         raise
     pictures = {} if png is None else _pictures(planned, png, each)
     _write(directory, files, pictures, later=["upload.json"] if targets else [])
@@ -471,7 +471,7 @@ def _require_options(planner: str | None, objective: str | None, png: Path | Non
     return each
 
 
-def _retire(directory: Path, source: MissionFile | None) -> None:
+def _retire(directory: Path, source: MissionFile | None, units: Units) -> None:
     """Move the outputs of an earlier plan out of the way, since there is no mission now, and say what its
     terrain has to note."""
     from gcsplan.cli.output.console import remark, say_terrain
@@ -483,7 +483,7 @@ def _retire(directory: Path, source: MissionFile | None) -> None:
     except InputError as error:  # the reason why there is no mission matters more
         remark(f"note: earlier outputs are still in {directory} and are of no use now: {error}")
     if source is not None:
-        say_terrain(source)
+        say_terrain(source, units)
 
 
 def _write(directory: Path, files: Mapping[str, str], pictures: dict[Path, bytes], later: Sequence[str]) -> None:

@@ -145,7 +145,8 @@ def say_homes(homes: Mapping[str, WayHome], units: Units) -> None:
     ]
     title = "[bold]way home[/]  the autopilot's own return, from every point of the path"
     rows_table(title, rows, left=("vehicle", "way home"))
-    known = {(h.autopilot, h.set_rel_home_m): _to_set(h, unit) for h in homes.values()}
+    # What to set for one that is not safe stands in its warning.
+    known = {(h.autopilot, h.set_rel_home_m): _to_set(h, unit) for h in homes.values() if h.safe is True}
     for (autopilot, best_m), words in known.items():
         if best_m is not None:
             say(f"{words} {unit.symbol} above home: {setting(autopilot, best_m)}")
