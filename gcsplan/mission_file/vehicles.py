@@ -431,7 +431,7 @@ def make_energy(keys: VehicleKeys, where: str, problems: list[Mistake], notes: l
         vertical_j_per_m=given.vertical_j_per_m, horizontal_j_per_m=along, hover_w=given.hover_w,
         battery_j=given.battery_j, reserve=given.reserve, battery_v=given.battery_v, base_w=base_w,
         fitted_m_s=None if speeds is None else (speeds[0], speeds[1]), stated=bool(given.model_fields_set),
-        papers=papers,
+        papers=papers, endurance_s=given.endurance_s,
     )  # fmt: skip
 
 

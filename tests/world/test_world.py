@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from gcsplan.units import AVIATION, in_units
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.geodesy.frame import Frame
 from gcsplan.world.geodesy.height_unit import METRE
 from gcsplan.world.geometry.surface import GridMap, Surface
-from gcsplan.units import AVIATION, in_units
 from gcsplan.world.terrain.model_words import heights_line, heights_read, what_is_not_in
 from gcsplan.world.world import ANSWERS_KEPT, World
 
