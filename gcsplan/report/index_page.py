@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from gcsplan.arrays import Floats
 from gcsplan.report.parts.html import THIN, document, energy, esc, greatest, least, num
 from gcsplan.report.views.shaded_terrain import GroundPatch, picture_of
 from gcsplan.units import Units, duration
@@ -110,8 +111,8 @@ def _terrain(
         return "", ""
     per_px = max(size[0], size[1] * shrink) / PIXELS
     rows, cols = (max(round(n / per_px), 2) for n in (size[0], size[1] * shrink))
-    lat = corner[0] - (np.arange(rows) + 0.5) * (size[0] / rows)
-    lon = (np.arange(cols) + 0.5) * (size[1] / cols)
+    lat: Floats = corner[0] - (np.arange(rows) + 0.5) * (size[0] / rows)
+    lon: Floats = (np.arange(cols) + 0.5) * (size[1] / cols)
     ground = np.full((rows, cols), np.nan)
     for one in grounds:
         south, west, north, east = one.box_deg
@@ -126,7 +127,8 @@ def _terrain(
         apart = num(per_px * PIXELS * METRES_PER_DEGREE, 0, units.far)
         return "", f"Terrain is not drawn: the missions lie up to {apart} apart, and each is too small on this map."
     low, high = float(np.nanmin(ground)), float(np.nanmax(ground))
-    east_m, north_m = lon * shrink * METRES_PER_DEGREE, lat * METRES_PER_DEGREE
+    east_m: Floats = lon * (shrink * METRES_PER_DEGREE)
+    north_m: Floats = lat * METRES_PER_DEGREE
     words = f"Ground from {num(low, 0, units.height)} to {num(high, 0, units.amsl)} is drawn around the missions."
     return picture_of(ground, east_m, north_m, low, high, clear=True), words
 
