@@ -95,7 +95,7 @@ class Energy:
     given; else they are the paper's, which say nothing about this aircraft, and no output tells an energy. ``papers``:
     a battery or a hover was given and nothing of what flying takes, so the paper's numbers count, marked in every
     output. ``battery_key`` is the key of the mission file that gave ``battery_j``, in units of ``battery_unit_j``.
-    ``endurance_s`` is how long that battery was said to last, where ``base_w`` comes from it.
+    ``endurance_s`` is the given endurance of that battery, where ``base_w`` comes from it.
     """
 
     vertical_j_per_m: float = 120.0

@@ -111,8 +111,9 @@ def _terrain(
         return "", ""
     per_px = max(size[0], size[1] * shrink) / PIXELS
     rows, cols = (max(round(n / per_px), 2) for n in (size[0], size[1] * shrink))
-    lat: Floats = corner[0] - (np.arange(rows) + 0.5) * (size[0] / rows)
-    lon: Floats = (np.arange(cols) + 0.5) * (size[1] / cols)
+    half_lat, half_lon = 0.5 * size[0] / rows, 0.5 * size[1] / cols
+    lat: Floats = np.linspace(corner[0] - half_lat, corner[0] - size[0] + half_lat, rows)
+    lon: Floats = np.linspace(half_lon, size[1] - half_lon, cols)
     ground = np.full((rows, cols), np.nan)
     for one in grounds:
         south, west, north, east = one.box_deg
@@ -129,7 +130,7 @@ def _terrain(
     low, high = float(np.nanmin(ground)), float(np.nanmax(ground))
     east_m: Floats = lon * (shrink * METRES_PER_DEGREE)
     north_m: Floats = lat * METRES_PER_DEGREE
-    words = f"Ground from {num(low, 0, units.height)} to {num(high, 0, units.amsl)} is drawn around the missions."
+    words = "The ground around the missions is drawn coarsely and smoothed: read no heights off it."
     return picture_of(ground, east_m, north_m, low, high, clear=True), words
 
 

@@ -201,8 +201,8 @@ def batches(air: Airspace, starts: Floats, ends: Floats, most: int, step_m: floa
 def _steps(
     step_m: float, air: Airspace, starts: Floats, ends: Floats, reaches: tuple[float, float, float], *, of_top: bool
 ) -> Pieces:
-    """The same as `_pieces` in pieces of ``step_m`` or less: what is within reach of a piece is within reach and half a
-    piece of its middle."""
+    """The same as `_pieces` in pieces of ``step_m`` or less: the ground within reach of a piece lies within reach and
+    half a piece of its middle."""
     length = np.hypot(*(ends - starts).T)
     counts = np.maximum(np.ceil(length / step_m), 1.0).astype(np.intp)
     line = np.repeat(np.arange(len(counts)), counts)
@@ -261,7 +261,7 @@ def _pieces(
     line = leg // 2
     base = np.concatenate([[0.0], after])[leg]
     s0 = np.where(back[line], after[leg] - rows[:, 0], begin - base)
-    # Of two columns, this is ten times faster than ``max(axis=1)``.
+    # For two columns, this is ten times faster than ``max(axis=1)``.
     bounds = np.minimum(rows[:, 1], rows[:, 2]), *(np.maximum(rows[:, k], rows[:, k + 1]) for k in (3, 5))
     return line, np.maximum(s0, 0.0), bounds
 

@@ -52,7 +52,7 @@ def test_the_map_has_the_ground_around_the_missions(lon: float) -> None:
     row = {"mission": "a", "vehicle": "u", "code": 0, "verdict": "safe", "message": ""}
     page = render_index("t", [row], {0: track}, [patch], METRIC, "summary.json")
     assert '<image href="data:image/webp;base64,' in page
-    assert "is drawn around the missions" in page
+    assert "The ground around the missions is drawn coarsely" in page
 
 
 def test_missions_too_far_apart_for_terrain_say_so() -> None:

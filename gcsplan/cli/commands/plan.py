@@ -288,6 +288,7 @@ def _earlier(
     source: MissionFile, directory: Path, compare_to: list[str], timeout_s: float
 ) -> list[dict[str, EarlierMission]]:
     """The missions of the last plan, and those on board where these are to be compared, each by vehicle."""
+    from gcsplan.cli.output.console import remark
     from gcsplan.export.outdir import outputs_in
 
     found: list[dict[str, EarlierMission]] = []
@@ -308,7 +309,9 @@ def _earlier(
             raise UsageError("--compare-to sim: a simulated vehicle has nothing on board; give a URL, or `link`")
         with talking(list(where)):
             missions = uploads.on_board(source, where, timeout_s=timeout_s)
-        found.append({name: EarlierMission(where[name], mission) for name, mission in missions.items()})
+        for name in (name for name, mission in missions.items() if not mission.items):
+            remark(f"{name}: there is no mission on board to compare with, by {where[name]}")
+        found.append({name: EarlierMission(where[name], m) for name, m in missions.items() if m.items})
     return found
 
 

@@ -145,11 +145,13 @@ def say_homes(homes: Mapping[str, WayHome], units: Units) -> None:
     ]
     title = "[bold]way home[/]  the autopilot's own return, from every point of the path"
     rows_table(title, rows, left=("vehicle", "way home"))
-    # What to set for one that is not safe stands in its warning.
-    known = {(h.autopilot, h.set_rel_home_m): _to_set(h, unit) for h in homes.values() if h.safe is True}
+    known = {(h.autopilot, h.set_rel_home_m): _to_set(h, unit) for h in homes.values()}
     for (autopilot, best_m), words in known.items():
         if best_m is not None:
             say(f"{words} {unit.symbol} above home: {setting(autopilot, best_m)}")
+    routes = [h.advice for h in homes.values() if h.safe is True and h.route == "mission"]
+    for note in dict.fromkeys(note for note in routes if note is not None):
+        say(f"by the mission: {note.text(Wording(units))}")
     say_warnings(homes, Wording(units))
 
 

@@ -28,7 +28,7 @@ LATTICE = 9
 SHAPE = (0.45, 1.3)
 """Least and greatest height over width of the map, so that it fits a page and a screen."""
 NO_GROUND = 65535
-PATCH_SIDE, PATCH_MARGIN = 24, 0.25
+PATCH_SIDE, PATCH_MARGIN = 48, 0.25
 """Heights along each side of a `GroundPatch`, and its margin as a part of half its longer side."""
 
 TINTS = (
@@ -251,14 +251,27 @@ class GroundPatch:
         return cls(box_deg, packed(ground, float(np.nanmin(ground)), float(np.nanmax(ground))))
 
     def at(self, lat_deg: Floats, lon_deg: Floats) -> Floats:
-        """(rows, cols) heights AMSL, m, over latitudes (rows,) and longitudes (cols,); NaN outside or unknown."""
+        """(rows, cols) heights AMSL, m, over latitudes (rows,) and longitudes (cols,); NaN outside or unknown.
+
+        They are smoothed, so that the picture has no edges where two heights are joined.
+        """
         one, (south, west, north, east) = self.heights, self.box_deg
         whole = np.frombuffer(base64.b64decode(str(one["heights"])), "<u2").reshape(one["rows"], one["cols"])
-        ground = np.where(whole == one["unknown"], np.nan, one["base"] + one["step"] * whole)
-        y = (north - lat_deg) / (north - south) * (ground.shape[0] - 1.0)
-        x = (lon_deg - west) / (east - west) * (ground.shape[1] - 1.0)
-        j, i = (np.clip(np.floor(a), 0, n - 2).astype(int) for a, n in zip((y, x), ground.shape, strict=True))
-        v, u = (y - j)[:, None], (x - i)[None]
-        left, right = ((1.0 - v) * ground[np.ix_(j, k)] + v * ground[np.ix_(j + 1, k)] for k in (i, i + 1))
-        inside = ((y >= 0.0) & (y <= ground.shape[0] - 1.0))[:, None] & (x >= 0.0) & (x <= ground.shape[1] - 1.0)
-        return np.where(inside, (1.0 - u) * left + u * right, np.nan)
+        unknown = whole == one["unknown"]
+        ground = np.where(unknown, float(one["base"]), one["base"] + one["step"] * whole)
+        y = _spline_weights((north - lat_deg) / (north - south), ground.shape[0])
+        x = _spline_weights((lon_deg - west) / (east - west), ground.shape[1])
+        hidden = ~(y @ unknown.astype(float) @ x.T <= 1e-9)  # outside too, where weights are NaN
+        return np.where(hidden, np.nan, y @ ground @ x.T)
+
+
+def _spline_weights(part: Floats, count: int) -> Floats:
+    """(N, count) weights of a uniform cubic B-spline at ``part`` 0 … 1 of its length; NaN outside."""
+    at = np.where((part >= 0.0) & (part <= 1.0), part * (count - 1.0), np.nan)
+    first = np.nan_to_num(np.floor(at)).clip(0, count - 2).astype(int)
+    t = at - first
+    each = ((1.0 - t) ** 3, 3.0 * t**3 - 6.0 * t**2 + 4.0, -3.0 * t**3 + 3.0 * t**2 + 3.0 * t + 1.0, t**3)
+    weights = np.zeros((len(at), count))
+    for k, weight in enumerate(each):
+        np.add.at(weights, (np.arange(len(at)), np.clip(first + k - 1, 0, count - 1)), weight / 6.0)
+    return weights
