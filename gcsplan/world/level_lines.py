@@ -41,10 +41,10 @@ from gcsplan.world.tube import TUBE_MARGIN_M, ZONE_ROOM_M, Reaches
 from gcsplan.world.zone_table import grown_edges
 
 WIDER_REACH = 1.6
-Pieces = tuple[Indices, Floats, tuple[Floats, Floats, Floats]]
+GroundPieces = tuple[Indices, Floats, tuple[Floats, Floats, Floats]]
 UNUSED = -1e9
 """A reach for which the kernel need not look for anything."""
-MOST_PIECES = 300_000
+MOST_GROUND_PIECES = 300_000
 """Most pieces of ground that are looked at under lines together, about; longer pieces stand for more."""
 MOST_LEVEL_ROWS = 200_000
 """Most pieces of the lines that are looked at together: the kernel's rows take 11 MB, which a cache holds, so returns
@@ -176,11 +176,11 @@ def over(
 def step_of(air: Airspace, starts: Floats, ends: Floats) -> float:
     """How long the pieces are, m, in which `over` may look at the ground under these lines; 0: cell by cell.
 
-    Lines with more than `MOST_PIECES` cells are looked at by longer pieces, each by the highest and lowest ground that
+    Lines with more than `MOST_GROUND_PIECES` cells are looked at by longer pieces, each by the highest and lowest ground that
     may be below any of it: the levels are then higher than they need be, never lower, and the work has a limit.
     """
     cells = float(_cells(air, starts, ends).sum())
-    return float(np.hypot(*(ends - starts).T).sum()) / MOST_PIECES if cells > MOST_PIECES else 0.0
+    return float(np.hypot(*(ends - starts).T).sum()) / MOST_GROUND_PIECES if cells > MOST_GROUND_PIECES else 0.0
 
 
 def _cells(air: Airspace, starts: Floats, ends: Floats) -> Floats:
@@ -200,7 +200,7 @@ def batches(air: Airspace, starts: Floats, ends: Floats, most: int, step_m: floa
 
 def _steps(
     step_m: float, air: Airspace, starts: Floats, ends: Floats, reaches: tuple[float, float, float], *, of_top: bool
-) -> Pieces:
+) -> GroundPieces:
     """The same as `_pieces` in pieces of ``step_m`` or less: the ground within reach of a piece lies within reach and
     half a piece of its middle."""
     length = np.hypot(*(ends - starts).T)
@@ -223,7 +223,7 @@ def _steps(
 
 def _pieces(
     air: Airspace, starts: Floats, ends: Floats, reaches: tuple[float, float, float], *, of_top: bool
-) -> Pieces:
+) -> GroundPieces:
     """The line of each piece, the distance along it at which the piece begins, and bounds of the surface there.
 
     The bounds (P,): the lowest ground within the first reach, the highest top within the second and the third; NaN
@@ -276,7 +276,7 @@ def _few(reach_m: float, air: Airspace) -> float:
 
 def _crossings(
     air: Airspace, starts: Floats, ends: Floats, reach: Reaches, wide_m: float, error_m: float, swept: Swept | None,
-    clearance_m: float, look: Callable[..., Pieces],
+    clearance_m: float, look: Callable[..., GroundPieces],
 ) -> Crossings:  # fmt: skip
     table, vertex = air.zone_table.arrays.table, air.zone_table.arrays.vertex
     step = ends - starts

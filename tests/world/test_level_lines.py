@@ -63,7 +63,7 @@ def test_lines_over_more_cells_than_the_limit_are_looked_at_by_longer_pieces() -
     met = level_lines.over(air, *ends, Limits(20.0), step_m=step_m)
     close = level_lines.over(air, *(e[:40] for e in ends), Limits(20.0))
     assert 0.0 < step_m < 20.0
-    assert len(met.piece_line) <= level_lines.MOST_PIECES + len(ends[0])
+    assert len(met.piece_line) <= level_lines.MOST_GROUND_PIECES + len(ends[0])
     assert (met.clear_m[:40] >= close.clear_m - 0.01).all()
     assert (met.clear_m[:40] <= z.max() + 0.1).all()
 
