@@ -176,8 +176,9 @@ def over(
 def step_of(air: Airspace, starts: Floats, ends: Floats) -> float:
     """How long the pieces are, m, in which `over` may look at the ground under these lines; 0: cell by cell.
 
-    Lines with more than `MOST_GROUND_PIECES` cells are looked at by longer pieces, each by the highest and lowest ground that
-    may be below any of it: the levels are then higher than they need be, never lower, and the work has a limit.
+    Lines with more than `MOST_GROUND_PIECES` cells are looked at by longer pieces, each by the highest and lowest
+    ground that may be below any of it: the levels are then higher than they need be, never lower, and the work has a
+    limit.
     """
     cells = float(_cells(air, starts, ends).sum())
     return float(np.hypot(*(ends - starts).T).sum()) / MOST_GROUND_PIECES if cells > MOST_GROUND_PIECES else 0.0
