@@ -41,7 +41,8 @@ class Mistake:
     """One mistake in the input: its place (``file: key.path``) and what to do about it.
 
     ``code`` is its kind, where programs tell kinds apart, ``meant`` are the names that may have been meant, and
-    ``line`` is the end of the message that says the line, if one is known.
+    ``line`` is the end of the message that says the line, if one is known; ``by`` are other keys whose values make it
+    one.
     """
 
     where: str
@@ -49,6 +50,7 @@ class Mistake:
     code: ProblemCode = ""
     meant: tuple[str, ...] = ()
     line: str = ""
+    by: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         return f"{self.where}: {self.message}" if self.where else self.message

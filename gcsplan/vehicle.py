@@ -95,6 +95,7 @@ class Energy:
     given; else they are the paper's, which say nothing about this aircraft, and no output tells an energy. ``papers``:
     a battery or a hover was given and nothing of what flying takes, so the paper's numbers count, marked in every
     output. ``battery_key`` is the key of the mission file that gave ``battery_j``, in units of ``battery_unit_j``.
+    ``endurance_s`` is the given endurance of that battery, where ``base_w`` comes from it.
     """
 
     vertical_j_per_m: float = 120.0
@@ -109,6 +110,7 @@ class Energy:
     papers: bool = False
     battery_key: str = field(default="battery_j", compare=False, repr=False)
     battery_unit_j: float = field(default=1.0, compare=False, repr=False)
+    endurance_s: float | None = field(default=None, compare=False, repr=False)
 
     def under_way_j(self, vertical_m: Amount, air_m: Amount, seconds: Amount) -> Amount:
         """Joules of moving for ``seconds``: ``vertical_m`` up and down, ``air_m`` horizontally through the air.

@@ -394,6 +394,17 @@ def test_an_altitude_to_set_reads_as_the_judged_one_that_it_is(capfd: pytest.Cap
         assert out.splitlines()[-1].startswith(f"{words[1]} ft above home: RTL_ALT 60000 (cm)")
 
 
+def test_a_return_by_the_mission_says_what_to_set_for_it(capfd: pytest.CaptureFixture[str]) -> None:
+    home = next(iter(planned()[1].values()))
+    assert home is not None
+    way = replace(
+        home, route="mission", starts=(3,), along_path=True, unsafe=(), irregular=(), battery=None, not_judged=()
+    )
+    say_homes({"a": way, "b": way}, METRIC)
+    [line] = [line for line in capfd.readouterr().out.splitlines() if line.startswith("by the mission: ")]
+    assert "set FS_THR_ENABLE, FS_GCS_ENABLE, BATT_FS_LOW_ACT, BATT_FS_CRT_ACT 6 (Auto RTL)" in line
+
+
 def test_rounding_after_the_conversion_differs_from_before_it() -> None:
     """33.05 m rounded down before it becomes feet would lose a tenth: 108.2 ft for 108.4 ft."""
     assert IMPERIAL.distance.of(floored(33.05, 1)) < 108.3

@@ -31,6 +31,7 @@ from gcsplan.errors import GcsplanError, InputError, NoMission, UsageError, wors
 from gcsplan.export.durable import locked, write_whole
 from gcsplan.export.outdir import has_outputs, is_output, retire_outputs, settle_outputs, write_outputs
 from gcsplan.mission_file.source import file_of, is_sample
+from gcsplan.report.views.shaded_terrain import GroundPatch
 from gcsplan.world.terrain.input_files import SPECIAL, FileReading, reading
 
 __all__ = [
@@ -50,7 +51,7 @@ FOLDER = "records"
 BATCH_TABLES = ("results.csv", "results.parquet", "index.html")
 """The files of a batch beside the folders of its missions."""
 
-FORMAT = 3
+FORMAT = 4
 MOST_BYTES_OF_A_RECORD = 64_000_000
 
 
@@ -62,6 +63,7 @@ class Record:
     (`gcsplan.world.terrain.input_files`; None: not known, and planned again next time). ``code`` is the exit code that
     `plan` would end with. ``files`` are the outputs, name to text, empty if they are on disk already. ``tracks`` are
     lists of [latitude, longitude], one for each of the first rows; the vehicles of the other rows are left out.
+    ``ground`` is the ground under them, None if none is known.
     """
 
     mission: str
@@ -71,6 +73,7 @@ class Record:
     tracks: tuple[Sequence[Sequence[float]], ...] = ()
     files: Mapping[str, str] | None = None
     inputs: Mapping[str, str] | None = None
+    ground: GroundPatch | None = None
 
 
 def write_record(directory: Path, record: Record) -> None:
@@ -81,7 +84,7 @@ def write_record(directory: Path, record: Record) -> None:
     body = json.dumps(
         {
             "asked": record.request, "inputs": inputs, "outputs": digests_of(record.files or {}), "code": record.code,
-            "rows": record.rows, "tracks": record.tracks,
+            "rows": record.rows, "tracks": record.tracks, "ground": record.ground and asdict(record.ground),
         },
         default=dict,
     )  # fmt: skip
@@ -102,7 +105,10 @@ def kept_record(directory: Path, mission: str, request: str) -> Record | None:
         if body["asked"] != request or not body["inputs"]:
             return None
         inputs, outputs = dict(body["inputs"]), dict(body["outputs"])
-        record = Record(mission, request, body["code"], tuple(body["rows"]), tuple(body["tracks"]), inputs=inputs)
+        ground = body["ground"] and GroundPatch(tuple(body["ground"]["box_deg"]), body["ground"]["heights"])
+        record = Record(
+            mission, request, body["code"], tuple(body["rows"]), tuple(body["tracks"]), inputs=inputs, ground=ground
+        )
         if type(record.code) is not int or not record.rows or any(row["mission"] != mission for row in record.rows):
             return None
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
@@ -295,7 +301,8 @@ def record_of(options: BatchOptions, item: tuple[str, str]) -> Record:
     out = [_refusal(name, NoMission.exit_code, v.reason, v.message, v.name) for v in planned.left_out]
     code = NoMission.exit_code if out else 0
     rows = (*_rows(name, files["summary.json"]), *out)
-    return Record(name, request, code, rows, tuple(_tracks(planned)), files, read.marks)
+    tracks = tuple(_tracks(planned))
+    return Record(name, request, code, rows, tracks, files, read.marks, GroundPatch.under(planned.world, tracks))
 
 
 def _failed(name: str, request: str, why: GcsplanError, read: FileReading | None = None) -> Record:

@@ -332,11 +332,16 @@ class _MissionReading:
         return InputError.of(listed if self.text is None else with_lines(listed, self.text, self.where))
 
     def _by_option(self, problem: Mistake) -> Mistake:
-        """The problem at the option that set its key, if one did."""
+        """The problem at the option that set its key, or else a limit that its key breaks, if one did."""
+        path = problem.where.removeprefix(self.where)
         for key, option in self.content.options:
-            rest = problem.where.removeprefix(self.where + key)
-            if rest != problem.where and rest[:1] in ("", "[", "."):
-                return replace(problem, where=f"{option}: {key}{rest}")
+            rest = path.removeprefix(key)
+            if rest != path and rest[:1] in ("", "[", "."):
+                return replace(problem, where=f"{option}: {path}")
+        for key, option in self.content.options:
+            section, _, name = key.rpartition(".")
+            if name in problem.by and (section == "limits" or path.startswith(f"{section.removesuffix('.limits')}.")):
+                return replace(problem, where=f"{option}: {path}")
         return problem
 
     # -- the plain keys ------------------------------------------------------------------------------------------

@@ -314,18 +314,17 @@ def _check_heights(keys: VehicleKeys, limits: Limits, where: str, problems: list
     high = float("inf")
     if limits.max_agl_m is not None:
         high = limits.max_agl_m - error_m
-        if limits.min_agl_m > limits.max_agl_m:
-            message = f"min_agl_m must not be above max_agl_m, given {limits.min_agl_m:g} and {limits.max_agl_m:g}"
-            problems.append(Mistake(f"{where}.min_agl_m", message))
-            return
         if low > high + 1e-9:
-            problems.append(
-                Mistake(
-                    f"{where}.max_agl_m",
-                    f"leaves no room: {words} is above max_agl_m {limits.max_agl_m:g} - altitude_error_m {error_m:g}; "
-                    f"write {math.ceil(low + error_m + CURE_ROUNDING_M)} or more",
-                )
-            )
+            above = limits.min_agl_m > limits.max_agl_m
+            message = f"min_agl_m must not be above max_agl_m, given {limits.min_agl_m:g} and {limits.max_agl_m:g}; "
+            if not above:
+                message = f"leaves no room: {words} is above max_agl_m {limits.max_agl_m:g} - "
+                message += f"altitude_error_m {error_m:g}; "
+            message += f"write max_agl_m {math.ceil(low + error_m + CURE_ROUNDING_M)} or more"
+            lower_m = math.floor(limits.min_agl_m + high - low - CURE_ROUNDING_M)
+            message += f", or min_agl_m {lower_m} or less" if lower_m > 0 else ""
+            key = "min_agl_m" if above else "max_agl_m"
+            problems.append(Mistake(f"{where}.{key}", message, by=("max_agl_m", "min_agl_m")))
             return
     heights = [("takeoff_agl_m", keys.takeoff_agl_m), ("approach_agl_m", keys.approach_agl_m)]
     for i, point in enumerate(keys.via):
@@ -334,11 +333,15 @@ def _check_heights(keys: VehicleKeys, limits: Limits, where: str, problems: list
         if agl_m is None:
             continue
         if agl_m < low - 1e-9:
-            problems.append(Mistake(f"{where}.{key}", f"must be at least {low:g} m AGL ({words}), given {agl_m:g}"))
+            problems.append(
+                Mistake(
+                    f"{where}.{key}", f"must be at least {low:g} m AGL ({words}), given {agl_m:g}", by=("min_agl_m",)
+                )
+            )
         elif agl_m > high + 1e-9:
             most = f"must be at most {high:g} m AGL (max_agl_m - altitude_error_m), given {agl_m:g}"
             most += f"; write {math.floor(high - CURE_ROUNDING_M)} or less"
-            problems.append(Mistake(f"{where}.{key}", most))
+            problems.append(Mistake(f"{where}.{key}", most, by=("max_agl_m",)))
 
 
 def make_arrival(
@@ -428,7 +431,7 @@ def make_energy(keys: VehicleKeys, where: str, problems: list[Mistake], notes: l
         vertical_j_per_m=given.vertical_j_per_m, horizontal_j_per_m=along, hover_w=given.hover_w,
         battery_j=given.battery_j, reserve=given.reserve, battery_v=given.battery_v, base_w=base_w,
         fitted_m_s=None if speeds is None else (speeds[0], speeds[1]), stated=bool(given.model_fields_set),
-        papers=papers,
+        papers=papers, endurance_s=given.endurance_s,
     )  # fmt: skip
 
 

@@ -317,7 +317,8 @@ CHECK_TEXTS = {
         "battery: the flight needs {needs_j:joules} and {usable_j:joules} may be used ({battery_j:joules} less "
         "{reserve_percent:g} % reserve)"
     ),
-    "battery_that_would_do": "{key_name}: {enough} would do for this path",
+    "battery_that_would_do": "{key_name}: {enough}{lasts} would do for this path",
+    "battery_lasts": " with {key_name}: {lasting_min:g} (the same power)",
     "too_many_items": "the mission has {count} items and {autopilot} takes {most}",
     "refused_on_upload": "would be refused on upload: {why}",
     "item_unreached": "item {by} {jumps:jumps back|holds} without end: item {item} is never reached",

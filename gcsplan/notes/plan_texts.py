@@ -51,9 +51,9 @@ PLAN_TEXTS = {
         "{up_m:height.0} above home, and goes on in circles of {circle_m:distance.0} up to {circled_m:height.0}"
     ),
     "circles_instead": (
-        "that is a long way straight ahead: there is room for climb_out: circles, which turns after {far_m:distance.0} "
-        "and climbs in circles of {circle_m:distance.0} to {up_m:height.0} above home; the mission from there is not "
-        "planned here: try it"
+        "that is a long way straight ahead: with climb_out: circles it turns after {far_m:distance.0} and climbs in "
+        "circles of {circle_m:distance.0} to {up_m:height.0} above home; this was tried: the mission is safe, and "
+        "{length_m:path.0} long"
     ),
     "approach": (
         "it lands on a heading of {heading_deg:.0f}°, gliding straight for {far_m:distance.0} from {up_m:height.0} "

@@ -235,6 +235,8 @@ def _way_home(s: Subject, units: Units) -> Iterator[tuple[str, str]]:
         yield "way home", "not judged"
         return
     yield "way home", esc(_short(home.headline.text(s.wording(units)), MESSAGE))
+    if home.route == "mission" and home.advice is not None:
+        yield "to set", esc(_short(home.advice.text(s.wording(units)), MESSAGE))
     if home.set_rel_home_m is not None and home.then is not None:
         yield "to set", esc(setting(home.autopilot, home.set_rel_home_m))
         points = f"with {counted(len(home.rally), 'rally point')} on board: " if home.rally else ""

@@ -289,11 +289,18 @@ class Airspace:
     def _around(self, sign: float, east_m: ArrayLike, north_m: ArrayLike, reach_m: float) -> Floats:
         """Highest value of ``sign`` times height within reach of each point; NaN where unknown."""
         e, n = np.broadcast_arrays(np.asarray(east_m, dtype=np.float64), np.asarray(north_m, dtype=np.float64))
-        out = np.empty(e.size)
         points = np.stack([e.ravel(), n.ravel()], axis=-1)
         held = self.extrema_along(sign > 0.0, reach_m, LineBatch(points, points))
-        around(self._tops if sign > 0.0 else self._bare, held, sign, points, reach_m, out)
-        return out.reshape(e.shape)
+        return self.around(sign, points, reach_m, held, of_top=sign > 0.0).reshape(e.shape)
+
+    def around(self, sign: float, points: Floats, reach_m: float, held: Held, *, of_top: bool) -> Floats:
+        """(N,) an upper bound of ``sign`` times the height of top or ground within reach of points (N, 2); NaN: none.
+
+        ``held``: `extrema_along` lines through the points, for that reach or a wider one.
+        """
+        out = np.empty(len(points))
+        around(self._tops if of_top else self._bare, held, sign, points, reach_m, out)
+        return out
 
     def extrema_along(self, of_top: bool, reach_m: float, lines: LineBatch) -> Held:
         """The kernels' extrema of top or ground for a reach, along lines."""

@@ -7,7 +7,9 @@ same margins: never below what `Airspace.examine` demands.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -39,8 +41,11 @@ from gcsplan.world.tube import TUBE_MARGIN_M, ZONE_ROOM_M, Reaches
 from gcsplan.world.zone_table import grown_edges
 
 WIDER_REACH = 1.6
+GroundPieces = tuple[Indices, Floats, tuple[Floats, Floats, Floats]]
 UNUSED = -1e9
 """A reach for which the kernel need not look for anything."""
+MOST_GROUND_PIECES = 300_000
+"""Most pieces of ground that are looked at under lines together, about; longer pieces stand for more."""
 MOST_LEVEL_ROWS = 200_000
 """Most pieces of the lines that are looked at together: the kernel's rows take 11 MB, which a cache holds, so returns
 of 240 km are judged in two thirds of the time that all at once take."""
@@ -120,23 +125,26 @@ class LevelLines:
 
 
 def over(
-    air: Airspace, starts: Floats, ends: Floats, limits: Limits, wide_m: float = 0.0, swept: Swept | None = None
-) -> LevelLines:
+    air: Airspace, starts: Floats, ends: Floats, limits: Limits, wide_m: float = 0.0, swept: Swept | None = None,
+    step_m: float = 0.0,
+) -> LevelLines:  # fmt: skip
     """The lines from each of ``starts`` (N, 2) straight to its ``ends`` (N, 2), all widened by ``wide_m`` of the plane.
 
     Errors and clearance of ``limits`` are included; a line of no length stands for its point. ``swept``: the regions
     that the lines represent, which lie within ``wide_m`` of them: zones that do not meet these regions are left out.
+    ``step_m``: see `step_of`; 0: pieces as short as the cells of the terrain model.
     """
     starts, ends = (np.ascontiguousarray(a, dtype=np.float64) for a in (starts, ends))
     reach = Reaches.of(limits, air.field, air.scale)
     near, far = reach.near_m + wide_m, reach.far_m + wide_m
     error = limits.altitude_error_m
-    margin = reach.near_margin_m if wide_m == 0.0 else TUBE_MARGIN_M
+    margin = reach.near_margin_m if wide_m == step_m == 0.0 else TUBE_MARGIN_M
     n = len(starts)
     clear_m, legal_m, ceiling_m = np.full(n, -np.inf), np.full(n, -np.inf), np.full(n, np.inf)
     found: list[tuple[Indices, Floats, Floats, Floats]] = []
-    for first, last in pairwise(batches(air, starts, ends, MOST_LEVEL_ROWS)):
-        line, s0, rows = _pieces(
+    look = _pieces if step_m == 0.0 else partial(_steps, step_m)
+    for first, last in pairwise(batches(air, starts, ends, MOST_LEVEL_ROWS, step_m)):
+        line, s0, (below, high, beside) = look(
             air, starts[first:last], ends[first:last],
             (
                 near if limits.max_agl_m is not None else UNUSED,
@@ -145,10 +153,10 @@ def over(
             ),
             of_top=True,
         )  # fmt: skip
-        high = _higher(rows, 3) + (error + margin)
+        high += error + margin
         legal = high + limits.min_agl_m
         if limits.horizontal_clearance_m > 0.0:
-            beside = _higher(rows, 5) + (error + max(reach.far_margin_m, margin))
+            beside += error + max(reach.far_margin_m, margin)
             high, legal = np.maximum(high, beside), np.maximum(legal, beside)
         unknown = np.isnan(high) | np.isnan(legal)
         high, legal = np.where(unknown, np.inf, high), np.where(unknown, np.inf, legal)
@@ -156,32 +164,72 @@ def over(
         np.maximum.at(clear_m, line, high)
         np.maximum.at(legal_m, line, legal)
         if limits.max_agl_m is not None:
-            low = np.where(unknown, -np.inf, _lower(rows, 1) - (error + margin))
+            low = np.where(unknown, -np.inf, below - (error + margin))
             np.minimum.at(ceiling_m, line, low + limits.max_agl_m)
         found.append((line, s0, high, legal))
     line, s0, high, legal = (np.concatenate(parts) for parts in zip(*found, strict=True))
     clearance_m = limits.horizontal_clearance_m * air.scale
-    crossings = _crossings(air, starts, ends, reach, wide_m, limits.over_zone_m, swept, clearance_m)
+    crossings = _crossings(air, starts, ends, reach, wide_m, limits.over_zone_m, swept, clearance_m, look)
     return LevelLines(clear_m, legal_m, ceiling_m, crossings, line, s0, high, legal)
 
 
-def batches(air: Airspace, starts: Floats, ends: Floats, most: int) -> list[int]:
+def step_of(air: Airspace, starts: Floats, ends: Floats) -> float:
+    """How long the pieces are, m, in which `over` may look at the ground under these lines; 0: cell by cell.
+
+    Lines with more than `MOST_GROUND_PIECES` cells are looked at by longer pieces, each by the highest and lowest
+    ground that may be below any of it: the levels are then higher than they need be, never lower, and the work has a
+    limit.
+    """
+    cells = float(_cells(air, starts, ends).sum())
+    return float(np.hypot(*(ends - starts).T).sum()) / MOST_GROUND_PIECES if cells > MOST_GROUND_PIECES else 0.0
+
+
+def _cells(air: Airspace, starts: Floats, ends: Floats) -> Floats:
+    """(N,) about how many pieces each line has, cell by cell."""
+    return np.asarray(16.0 + 3.0 * np.hypot(*(ends - starts).T) / min(air.field.step_x, air.field.step_y))
+
+
+def batches(air: Airspace, starts: Floats, ends: Floats, most: int, step_m: float = 0.0) -> list[int]:
     """The first line of each batch of some ``most`` pieces, and the number of lines.
 
     Batches begin with an even line: `_pieces` follows every other one backwards.
     """
-    cells = 16.0 + 3.0 * np.hypot(*(ends - starts).T) / min(air.field.step_x, air.field.step_y)
-    batch = np.floor(np.cumsum(cells) / most)[::2]
+    count = _cells(air, starts, ends) if step_m == 0.0 else 1.0 + np.hypot(*(ends - starts).T) / step_m
+    batch = np.floor(np.cumsum(count) / most)[::2]
     return [0, *(2 * (1 + np.flatnonzero(np.diff(batch)))).tolist(), len(starts)]
+
+
+def _steps(
+    step_m: float, air: Airspace, starts: Floats, ends: Floats, reaches: tuple[float, float, float], *, of_top: bool
+) -> GroundPieces:
+    """The same as `_pieces` in pieces of ``step_m`` or less: the ground within reach of a piece lies within reach and
+    half a piece of its middle."""
+    length = np.hypot(*(ends - starts).T)
+    counts = np.maximum(np.ceil(length / step_m), 1.0).astype(np.intp)
+    line = np.repeat(np.arange(len(counts)), counts)
+    nth = np.arange(len(line)) - np.repeat(np.cumsum(counts) - counts, counts)
+    own_m = length / counts
+    places = starts[line] + ((nth + 0.5) / counts[line])[:, None] * (ends - starts)[line]
+    lines, bow = LineBatch(starts, ends), 0.0 if air.field.affine else BOW_M + 2.0 * air.field.error_m
+    out = []
+    for reach, sign, top in zip(reaches, (-1.0, 1.0, 1.0), (False, of_top, of_top), strict=True):
+        if reach == UNUSED:
+            out.append(np.zeros(len(line)))
+            continue
+        within = reach + bow + 0.5 * float(own_m.max(initial=0.0))
+        held = air.extrema_along(top, _few(within, air), lines)
+        out.append(sign * air.around(sign, places, within, held, of_top=top))
+    return line, nth * own_m[line], (out[0], out[1], out[2])
 
 
 def _pieces(
     air: Airspace, starts: Floats, ends: Floats, reaches: tuple[float, float, float], *, of_top: bool
-) -> tuple[Indices, Floats, Floats]:
-    """The line of each piece, the distance along it at which the piece begins, and the kernel's rows.
+) -> GroundPieces:
+    """The line of each piece, the distance along it at which the piece begins, and bounds of the surface there.
 
-    Both surfaces are the ground unless ``of_top``. Every other line is followed backwards, so that one track covers all
-    of them: out, home, out again.
+    The bounds (P,): the lowest ground within the first reach, the highest top within the second and the third; NaN
+    where it is not known; any number for a reach that is `UNUSED`. Both surfaces are the ground unless ``of_top``.
+    Every other line is followed backwards, so that one track covers all of them: out, home, out again.
     """
     heed_cancel()
     n = len(starts)
@@ -214,17 +262,9 @@ def _pieces(
     line = leg // 2
     base = np.concatenate([[0.0], after])[leg]
     s0 = np.where(back[line], after[leg] - rows[:, 0], begin - base)
-    return line, np.maximum(s0, 0.0), rows
-
-
-def _higher(rows: Floats, column: int) -> Floats:
-    """(P,) the greater of this column and the next: of two columns, that is ten times faster than ``max(axis=1)``."""
-    return np.maximum(rows[:, column], rows[:, column + 1])
-
-
-def _lower(rows: Floats, column: int) -> Floats:
-    """(P,) the smaller of this column and the next."""
-    return np.minimum(rows[:, column], rows[:, column + 1])
+    # For two columns, this is ten times faster than ``max(axis=1)``.
+    bounds = np.minimum(rows[:, 1], rows[:, 2]), *(np.maximum(rows[:, k], rows[:, k + 1]) for k in (3, 5))
+    return line, np.maximum(s0, 0.0), bounds
 
 
 def _few(reach_m: float, air: Airspace) -> float:
@@ -237,7 +277,7 @@ def _few(reach_m: float, air: Airspace) -> float:
 
 def _crossings(
     air: Airspace, starts: Floats, ends: Floats, reach: Reaches, wide_m: float, error_m: float, swept: Swept | None,
-    clearance_m: float,
+    clearance_m: float, look: Callable[..., GroundPieces],
 ) -> Crossings:  # fmt: skip
     table, vertex = air.zone_table.arrays.table, air.zone_table.arrays.vertex
     step = ends - starts
@@ -279,15 +319,15 @@ def _crossings(
         wide = reach.far_m + wide_m + ZONE_ROOM_M
         a = starts[line[follow]] + s0[follow, None] * unit[line[follow]]
         b = starts[line[follow]] + s1[follow, None] * unit[line[follow]]
-        part, _, rows = _pieces(air, a, b, (wide, wide, UNUSED), of_top=False)
+        part, _, (below, above, _) = look(air, a, b, (wide, wide, UNUSED), of_top=False)
         low, high = np.full(len(follow), np.inf), np.full(len(follow), -np.inf)
         # Bounds over all the ground under the zone hold too; where ground is unknown, the zone can be neither overflown
         # nor underflown.
         row = table[zone[follow]]
         with np.errstate(invalid="ignore"):
-            unknown = np.isnan(rows[:, 1:3]).any(axis=1)
-            np.minimum.at(low, part, np.where(unknown, -np.inf, _lower(rows, 1)))
-            np.maximum.at(high, part, np.where(unknown, np.inf, _higher(rows, 3)))
+            unknown = np.isnan(below)
+            np.minimum.at(low, part, np.where(unknown, -np.inf, below))
+            np.maximum.at(high, part, np.where(unknown, np.inf, above))
             known = np.isfinite(low) & np.isfinite(high)
             floor = np.fmax(low + (bottom[follow] - TUBE_MARGIN_M), row[:, BAND_LOW])
             ceiling = np.fmin(high + (top[follow] + TUBE_MARGIN_M), row[:, BAND_HIGH])

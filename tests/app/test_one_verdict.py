@@ -73,7 +73,7 @@ def test_a_batch_tells_in_index_and_csv_what_its_pages_tell(tmp_path: Path) -> N
         assert row["verdict"].endswith(ends)
         assert (row["safe"], row["return_safe"]) == (True, False if report else None)
         assert row["verdict"] in csv_text(BATCH_COLUMNS, [row])
-        assert row["verdict"] in render_index("b", records[0].rows, {}, METRIC, "report.html")
+        assert row["verdict"] in render_index("b", records[0].rows, {}, (), METRIC, "report.html")
         if report:
             assert row["verdict"] in (out / "crossing" / "report.html").read_text(encoding="utf-8")
         assert row["max_agl_m"] > row["min_agl_m"]

@@ -171,6 +171,29 @@ def test_a_mistake_in_an_option_has_the_option_as_its_place() -> None:
         load_mission(STYLES[0], changes=[far])
 
 
+@pytest.mark.parametrize(
+    ("key", "value", "vehicle", "words"),
+    [
+        (
+            "max_agl_m",
+            20,
+            None,
+            r"^--max: vehicles.0..min_agl_m: .* write max_agl_m 41 or more, or min_agl_m 9 or less",
+        ),
+        ("min_agl_m", 115, "uav1", r"^--min: vehicles.0..max_agl_m: leaves no room: .*, or min_agl_m 109 or less"),
+        ("min_agl_m", 95, None, r"^--min: vehicles.0..via.0.: must be at least 100 m AGL"),
+        ("max_agl_m", 60, None, r"^--max: vehicles.0..via.0.: must be at most 55 m AGL"),
+    ],
+)
+def test_a_limit_of_an_option_is_named_by_it_where_another_key_breaks_it(
+    tmp_path: Path, key: str, value: int, vehicle: str | None, words: str
+) -> None:
+    text = STYLES[0].replace("  #max_agl_m", "  max_agl_m").replace("via: []", "via: [[47.0, 8.01, 90]]")
+    (tmp_path / "m.yaml").write_text(text)
+    with pytest.raises(InputError, match=words):
+        load_mission(tmp_path / "m.yaml", changes=[MissionChange(f"--{key[:3]}", "limit", key, value, vehicle)])
+
+
 def test_text_that_shares_a_changed_part_is_refused() -> None:
     text = "limits: &l {min_agl_m: 30}\nother: *l\n"
     with pytest.raises(UsageError, match="alias"):

@@ -26,15 +26,18 @@ from tests.support.random_worlds import (
 
 
 @pytest.mark.first_quick
+@pytest.mark.parametrize("step", [0.0, 0.2, 1.0])
 @pytest.mark.parametrize("make", [in_plane, turned, in_degrees])
-def test_what_is_clear_of_ground_and_zones_passes_the_exact_check(make: object) -> None:
+def test_what_is_clear_of_ground_and_zones_passes_the_exact_check(make: object, step: float) -> None:
+    """In pieces as short as cells, and in pieces of a part of the longest line."""
     rng, looked = np.random.default_rng(11), 0
     for _ in range(25):
         ground = make(rng)  # type: ignore[operator]
         limits = replace(random_limits(rng, ground), max_climb_deg=90.0, max_descent_deg=90.0, max_amsl_m=None)
         air = Airspace(surface_of(rng, ground), random_zones(rng, ground), scale=float(rng.choice([1.0, 1.0003])))
         ends = np.array([random_leg(rng, ground) for _ in range(9)])
-        met = level_lines.over(air, ends[:, 0], ends[:, 1], limits)
+        longest_m = float(np.hypot(*(ends[:, 1] - ends[:, 0])[:, :2].T).max())
+        met = level_lines.over(air, ends[:, 0], ends[:, 1], limits, step_m=step * longest_m)
         for need, asked in (
             (met.clear_m, replace(limits, min_agl_m=0.0, max_agl_m=None)), (met.legal_m, limits),
         ):  # fmt: skip
@@ -48,7 +51,21 @@ def test_what_is_clear_of_ground_and_zones_passes_the_exact_check(make: object) 
             legs = Legs.between(np.column_stack([ends[:, 0], z]), np.column_stack([ends[:, 1], z]), asked)
             assert air.clear(legs, asked)[fine].all()
             looked += int(fine.sum())
-    assert looked > 60
+    assert looked > (60, 30, 5)[(0.0, 0.2, 1.0).index(step)]
+
+
+def test_lines_over_more_cells_than_the_limit_are_looked_at_by_longer_pieces() -> None:
+    z = np.random.default_rng(4).uniform(0.0, 60.0, (61, 61))
+    air = Airspace(Surface(z, z, GridMap.affine(0.0, 300.0, 5.0, 5.0)))
+    ends = np.random.default_rng(5).uniform(30.0, 270.0, (2, 12_000, 2))
+    assert level_lines.step_of(air, ends[0][:100], ends[1][:100]) == 0.0
+    step_m = level_lines.step_of(air, *ends)
+    met = level_lines.over(air, *ends, Limits(20.0), step_m=step_m)
+    close = level_lines.over(air, *(e[:40] for e in ends), Limits(20.0))
+    assert 0.0 < step_m < 20.0
+    assert len(met.piece_line) <= level_lines.MOST_GROUND_PIECES + len(ends[0])
+    assert (met.clear_m[:40] >= close.clear_m - 0.01).all()
+    assert (met.clear_m[:40] <= z.max() + 0.1).all()
 
 
 def test_what_is_needed_over_a_slope_and_where() -> None:

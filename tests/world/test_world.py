@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from gcsplan.units import AVIATION, in_units
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.geodesy.frame import Frame
 from gcsplan.world.geodesy.height_unit import METRE
@@ -80,3 +81,6 @@ def test_how_heights_were_read_is_one_line_with_the_ends_rounded_outwards() -> N
     assert heights_read([unit], "EGM96", 5.0, 5.0).endswith("ground 5 m AMSL")
     assert heights_line({"heights_read": words}) == f"heights: {words}"
     assert heights_line({}) is None
+    line = heights_line({"heights_read": words})
+    assert line is not None
+    assert in_units(line, AVIATION).endswith("ground 527–1441 ft AMSL")

@@ -22,7 +22,7 @@ from gcsplan.notes.note import Note
 from gcsplan.planners.problem import Problem, Progress, Refusal, Solution, Via, lowest_amsl
 from gcsplan.planners.refusal.suggestions import FILLED
 from gcsplan.units import METRIC
-from gcsplan.vehicle import Autopilot, Vehicle
+from gcsplan.vehicle import Autopilot, Energy, Vehicle
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.geodesy.atmosphere import TROPOPAUSE_M
 from gcsplan.world.geodesy.frame import FARTHEST_M
@@ -109,7 +109,7 @@ def unsafe(verdict: Verdict, vehicle: Vehicle) -> NoMission:
     words = "\n".join(f"  {f.message}" for f in verdict.findings[:8])
     if all(f.kind == "battery" for f in verdict.findings):
         note = verdict.findings[0].note
-        cure = Note("battery_that_would_do", key_name=vehicle.energy.battery_key, enough=_enough(verdict, vehicle))
+        cure = _battery_that_would_do(verdict, vehicle.energy)
         return NoMission(f"{vehicle.name}: {note.in_units(METRIC)}; {cure}", reason="battery")
     items, first = verdict.mission.items, verdict.mission.first_seq
     returns = {i + first for i, item in enumerate(items) if item.command == cmd.RTL}
@@ -126,15 +126,21 @@ def unsafe(verdict: Verdict, vehicle: Vehicle) -> NoMission:
     )
 
 
-def _enough(verdict: Verdict, vehicle: Vehicle) -> str:
-    """The least battery of three digits, in the unit that the mission file has it in, with which the flight passes."""
-    energy = vehicle.energy
+def _battery_that_would_do(verdict: Verdict, energy: Energy) -> Note:
+    """The least battery of three digits, in the unit that the mission file has it in, with which the flight passes.
+
+    A battery whose endurance is given lasts longer in proportion: else a larger one would only mean more power.
+    """
     least = verdict.energy_j / (1.0 - energy.reserve) / energy.battery_unit_j
     step = 10.0 ** (math.floor(math.log10(least)) - 2)
     units = math.ceil(least / step)
     while verdict.energy_j > (1.0 - energy.reserve) * (units * step * energy.battery_unit_j):
         units += 1
-    return f"{units * step:.10g}"
+    lasts = None
+    if energy.endurance_s is not None and energy.battery_j:
+        lasting_min = energy.endurance_s / 60.0 * (units * step * energy.battery_unit_j / energy.battery_j)
+        lasts = Note("battery_lasts", key_name="endurance_min", lasting_min=math.ceil(1e3 * lasting_min) / 1e3)
+    return Note("battery_that_would_do", key_name=energy.battery_key, enough=f"{units * step:.10g}", lasts=lasts)
 
 
 def make_problem(

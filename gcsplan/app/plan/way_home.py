@@ -210,12 +210,17 @@ def require(homes: Mapping[str, WayHome | None], *, required: bool) -> None:
 
 
 def _lines(name: str, home: WayHome | None, wording: Wording = IN_FILES) -> list[str]:
-    """The headline, what to set, what a return path would do, and all that was tried if that is more."""
+    """The headline, and what to set and what a return path would do, or all that was tried if that is more."""
     if home is None:
         return [f"{name}: the return was not judged"]
-    several = len(home.proposals) > 1
-    tried = Note("proposals_tried", proposals=tuple(p.note for p in home.proposals)) if several else None
-    notes = (home.headline, home.advice, home.path_back, tried)
+    tried = home.proposals if len(home.proposals) > 1 else ()
+    listed = {key for p in tried for key, value in p.keys if key != "rtl_rel_home_m" or value == home.set_rel_home_m}
+    notes = (
+        home.headline,
+        None if "rtl_rel_home_m" in listed else home.advice,
+        None if "return_route" in listed else home.path_back,
+        Note("proposals_tried", proposals=tuple(p.note for p in tried)) if tried else None,
+    )
     return [f"{name}: {note.text(wording)}" for note in notes if note is not None]
 
 

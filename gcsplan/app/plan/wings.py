@@ -97,10 +97,11 @@ def wing_attempts(brief: Brief, request: VehicleRequest, limited: VehicleRequest
 
 
 def _joined(
-    brief: Brief, request: VehicleRequest, limited: VehicleRequest, problem: Problem, sharp: Floats, world: World
+    brief: Brief, request: VehicleRequest, limited: VehicleRequest, problem: Problem, sharp: Floats, world: World,
+    *, trial: bool = False,
 ) -> VehiclePlan:  # fmt: skip
     """The mission with the first pair of ends that a path can be joined to; it may still break limits, and has no bound
-    then."""
+    then, nor in a ``trial``."""
     vehicle = request.vehicle
     refused: list[NoMission] = []
     why = ""
@@ -130,11 +131,14 @@ def _joined(
         if crowded:
             why = f"{APART}\n  {crowded[0]}"
             continue
-        if not verdict.findings and found.lower_bound is not None:
+        if not verdict.findings and found.lower_bound is not None and not trial:
             bound = bound_between(brief, inner, solution.path.points, start, goal, vehicle, world)
             solution = with_bound(solution, bound, problem)
         speed = vehicle.speed_max_m_s
-        notes = (*_notes(start, goal), *_circles_instead(problem, limited, sharp, start))
+        notes = tuple(_notes(start, goal))
+        straight_m = 0.0 if start.circle is not None else math.dist(start.top[:2], start.ground[:2])
+        if straight_m >= LONG_CLIMB_OUT_M and not verdict.findings:
+            notes += tuple(_circles_instead(brief, request, limited, problem, sharp, world))
         return VehiclePlan(request, inner, solution, mission, verdict, speed, notes, order, over)
     if refused and not why:
         raise refused[0] from refused[0].__cause__
@@ -305,19 +309,25 @@ def _order(brief: Brief, request: VehicleRequest, start: FlightEnd, goal: Flight
     return Order(request.end, brief.source.altitude_frame, wing=wing)
 
 
-def _circles_instead(problem: Problem, request: VehicleRequest, sharp: Floats, start: FlightEnd) -> Iterator[Note]:
-    """The climbing circle that may take the place of a climb-out of kilometres, if one is clear."""
-    if start.circle is not None or math.dist(start.top[:2], start.ground[:2]) < LONG_CLIMB_OUT_M:
-        return
+def _circles_instead(
+    brief: Brief, request: VehicleRequest, limited: VehicleRequest, problem: Problem, sharp: Floats, world: World
+) -> Iterator[Note]:
+    """The climbing circle that may take the place of a climb-out of kilometres, if a mission with it is safe.
+
+    All trials together take no more than the budget of the plan.
+    """
+    trial = replace(problem, budget_s=problem.budget_s / MOST_JOINTS, progress=None)
+    circling = replace(request, climb_out="circles"), replace(limited, climb_out="circles")
     try:
-        circles = next(starts(problem, replace(request, climb_out="circles"), sharp))
+        tried = _joined(brief, circling[0], circling[1], trial, sharp, world, trial=True)
     except NoMission:
         return
-    assert circles.circle is not None
-    yield Note(
-        "circles_instead", far_m=math.dist(circles.top[:2], circles.ground[:2]), circle_m=abs(circles.circle_m),
-        up_m=float(circles.circle[2] - circles.ground[2]),
-    )  # fmt: skip
+    made = next((note.data for note in tried.notes if note.code == "climb_out_in_circles"), None)
+    if made is not None and tried.verdict.safe is True:
+        yield Note(
+            "circles_instead", far_m=made["far_m"], circle_m=made["circle_m"], up_m=made["circled_m"],
+            length_m=tried.verdict.length_m,
+        )  # fmt: skip
 
 
 def _notes(start: FlightEnd, goal: FlightEnd | None) -> Iterator[Note]:

@@ -206,7 +206,7 @@ def obstacles_of_returns(
     away = np.hypot(*(end - start).T) > there_m
     cone = rule.cone_amsl_m(target.cone_amsl_m, np.maximum(nearest, there_m))
     climb = vehicle.climb_m_s / vehicle.speed_max_m_s if math.isfinite(vehicle.climb_m_s) else 1.0
-    found = _Builder(places.high)
+    found, step_m = _Builder(places.high), level_lines.step_of(air, start, end)
 
     def groups(which: Bools) -> list[Indices]:
         kinds = (np.flatnonzero(which & corner) for corner in (~places.corner, places.corner))
@@ -215,9 +215,9 @@ def obstacles_of_returns(
     for alike in groups(away):
         wide, spots = float((extra + aside)[alike].max()), []
         if not rule.climbs_first:
-            _flies_home(found, air, limits, alike, (start, end), (reach, extra, aside), low, climb)
-        for some in _in_turn(air, start, end, alike):
-            met = level_lines.over(air, start[some], end[some], limits, wide, places.swept(some, air.scale))
+            _flies_home(found, air, limits, alike, (start, end), (reach, extra, aside), low, climb, step_m)
+        for some in _in_turn(air, start, end, alike, step_m):
+            met = level_lines.over(air, start[some], end[some], limits, wide, places.swept(some, air.scale), step_m)
             found.cost += len(met.piece_line)
             at = met.crossings
             i = some[at.line]
@@ -260,6 +260,7 @@ def _flies_home(
     widths: tuple[Floats, Floats, Floats],
     low: Floats,
     climb: float,
+    step_m: float,
 ) -> None:
     """Add the ground under planes that fly home from aside of the line: near home they are near the line.
 
@@ -271,15 +272,15 @@ def _flies_home(
     for a, b in pairwise(ASIDE_PARTS):
         wide = float((extra + (1.0 - a) * aside)[some].max())
         spare = (reach + aside)[some] - a * length
-        for k in _in_turn(air, start + a * step, start + b * step, np.arange(len(some))):
-            met = level_lines.over(air, start[k] + a * step[k], start[k] + b * step[k], limits, wide)
+        for k in _in_turn(air, start + a * step, start + b * step, np.arange(len(some)), step_m):
+            met = level_lines.over(air, start[k] + a * step[k], start[k] + b * step[k], limits, wide, step_m=step_m)
             found.cost += len(met.piece_line)
             found.ground(some[k], met, -np.inf, *_climbs(met, low[some[k]], spare[k], climb))
 
 
-def _in_turn(air: Airspace, starts: Floats, ends: Floats, some: Indices) -> Iterator[Indices]:
+def _in_turn(air: Airspace, starts: Floats, ends: Floats, some: Indices, step_m: float) -> Iterator[Indices]:
     """Parts of the lines ``some`` that have about `MOST_PIECES_HELD` pieces together, and of which only one is held."""
-    for first, last in pairwise(level_lines.batches(air, starts[some], ends[some], MOST_PIECES_HELD)):
+    for first, last in pairwise(level_lines.batches(air, starts[some], ends[some], MOST_PIECES_HELD, step_m)):
         yield some[first:last]
 
 

@@ -6,7 +6,8 @@ with the kernels and margins of the exact check (`gcsplan.world.level_lines`), a
 that the returns sweep. Nothing is sampled, so a point reported as safe is safe. A point reported as unsafe is unsafe,
 except: at the ends of a stretch (`refinement.SMALLEST_PART_M`), in safe gaps within a stretch that are shorter than
 `COARSE_M` (`COARSEST_M` on long missions), and for what the bounds of the ground beside a line cost: the widening times
-the slope there. Apart from that the lowest altitude is at most `LEVEL_M` too high.
+the slope there, and half a piece more on long missions over fine cells (`level_lines.step_of`). Apart from that the
+lowest altitude is at most `LEVEL_M` too high.
 
 `lowest_agl`: the lowest height of the returns above ground, at one return altitude. It counts from the ground and what
 stands on it, within the track error of where a return is, at the altitudes that the autopilot may fly; the altitude
@@ -367,10 +368,10 @@ def heights_agl(
     end = np.tile(target.en, (n, 1))
     wide = places.wide_m * air.scale
     extra, aside = half + wide + places.bow_m * air.scale, places.aside_m * air.scale
-    out = np.full(n, np.inf)
+    out, step_m = np.full(n, np.inf), level_lines.step_of(air, start, end)
 
     def ground(a: Floats, b: Floats, width: Floats) -> level_lines.LevelLines:
-        return level_lines.over(air, a, b, limits, float(width.max(initial=0.0)))
+        return level_lines.over(air, a, b, limits, float(width.max(initial=0.0)), step_m=step_m)
 
     if rule.climbs_first:
         there_m = at_home_m(limits)

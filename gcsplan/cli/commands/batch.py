@@ -119,7 +119,9 @@ def _tables(out: Path, done: Sequence[Record], units: UnitsChoice, page: str) ->
     drawn = {k: track for k, track in enumerate(tracks) if len(track) > 1}
     files: dict[str, str | bytes] = {
         "results.csv": csv_text(BATCH_COLUMNS, rows),
-        "index.html": render_index(out.resolve().name, rows, drawn, units_of(units), page),
+        "index.html": render_index(
+            out.resolve().name, rows, drawn, [r.ground for r in done if r.ground is not None], units_of(units), page
+        ),
     }
     try:
         files["results.parquet"] = parquet_bytes(BATCH_COLUMNS, rows)

@@ -334,7 +334,7 @@ def _say_all(batch: Batch, units: Units) -> None:
 
     wording = Wording(units, batch.typed)
     say_notes(batch.notes, wording)
-    say_heights(batch.inputs)
+    say_heights(batch.inputs, units)
     for c in batch.checked:
         say_notes(c.notes, wording)
         name = f"{c.file} as {c.vehicle.name} ({c.vehicle.autopilot})"

@@ -258,7 +258,7 @@ def plan(
     except UsageError:
         raise  # a mistake on the command line does not invalidate an earlier mission
     except (InputError, NoMission, CheckFailed):
-        _retire(directory, None if as_json else source)
+        _retire(directory, None if as_json else source, system)
         raise
     pictures = {} if png is None else _pictures(planned, png, each)
     _write(directory, files, pictures, later=["upload.json"] if targets else [])
@@ -288,6 +288,7 @@ def _earlier(
     source: MissionFile, directory: Path, compare_to: list[str], timeout_s: float
 ) -> list[dict[str, EarlierMission]]:
     """The missions of the last plan, and those on board where these are to be compared, each by vehicle."""
+    from gcsplan.cli.output.console import remark
     from gcsplan.export.outdir import outputs_in
 
     found: list[dict[str, EarlierMission]] = []
@@ -308,7 +309,9 @@ def _earlier(
             raise UsageError("--compare-to sim: a simulated vehicle has nothing on board; give a URL, or `link`")
         with talking(list(where)):
             missions = uploads.on_board(source, where, timeout_s=timeout_s)
-        found.append({name: EarlierMission(where[name], mission) for name, mission in missions.items()})
+        for name in (name for name, mission in missions.items() if not mission.items):
+            remark(f"{name}: there is no mission on board to compare with, by {where[name]}")
+        found.append({name: EarlierMission(where[name], m) for name, m in missions.items() if m.items})
     return found
 
 
@@ -471,7 +474,7 @@ def _require_options(planner: str | None, objective: str | None, png: Path | Non
     return each
 
 
-def _retire(directory: Path, source: MissionFile | None) -> None:
+def _retire(directory: Path, source: MissionFile | None, units: Units) -> None:
     """Move the outputs of an earlier plan out of the way, since there is no mission now, and say what its
     terrain has to note."""
     from gcsplan.cli.output.console import remark, say_terrain
@@ -483,7 +486,7 @@ def _retire(directory: Path, source: MissionFile | None) -> None:
     except InputError as error:  # the reason why there is no mission matters more
         remark(f"note: earlier outputs are still in {directory} and are of no use now: {error}")
     if source is not None:
-        say_terrain(source)
+        say_terrain(source, units)
 
 
 def _write(directory: Path, files: Mapping[str, str], pictures: dict[Path, bytes], later: Sequence[str]) -> None:

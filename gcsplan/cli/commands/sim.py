@@ -76,6 +76,11 @@ def sim(
 
     def ready(server: SimServer) -> None:
         names = ", ".join(f"system {v.sysid} ({v.autopilot} {v.firmware.name})" for v in vehicles)
-        remark(f"simulating {names}; connect to {server.url_for_gcs}; Ctrl-C ends it")
+        at = (
+            ""
+            if mission is not None
+            else f" at {stands[0][2][0]:g}, {stands[0][2][1]:g} (with MISSION.yaml: at its start)"
+        )
+        remark(f"simulating {names}{at}; connect to {server.url_for_gcs}; Ctrl-C ends it")
 
     serve(vehicles, listen, on_ready=ready)

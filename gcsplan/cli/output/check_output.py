@@ -52,7 +52,7 @@ class Lines:
 
         if self.summed:
             say_notes(header[2], Wording(self.units, header[3]))
-            say_heights(header[1])
+            say_heights(header[1], self.units)
 
     def tell(self, result: FileResult) -> None:
         """See `Printer`."""

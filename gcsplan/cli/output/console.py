@@ -159,7 +159,7 @@ def plan_table(plan: Plan, homes: Mapping[str, WayHome], units: Units = METRIC) 
     noted = [("", note) for note in plan.notes]
     noted += [(v.name, note) for v in plan.vehicles for note in v.all_notes(plan.fleet)]
     say_notes_of(for_people(noted), Wording(units))
-    say_heights(plan.source.inputs)
+    say_heights(plan.source.inputs, units)
     if words := what_is_not_in(plan.source.inputs):
         console.print(words, style="yellow", markup=False)
 
@@ -172,18 +172,18 @@ def _brief(units: Units) -> tuple[str, ...]:
     )  # fmt: skip
 
 
-def say_heights(inputs: Mapping[str, object]) -> None:
-    """Print how the terrain's heights were read, as one note, in SI."""
+def say_heights(inputs: Mapping[str, object], units: Units) -> None:
+    """Print how the terrain's heights were read, as one note."""
     if (line := heights_line(inputs)) is not None:
-        _say_noted([line])
+        _say_noted([in_units(line, units)])
 
 
-def say_terrain(source: MissionFile) -> None:
+def say_terrain(source: MissionFile, units: Units) -> None:
     """Print what a mission's terrain has to note, if anything, and how its heights were read: it may explain why there
     is no mission."""
     if notes := notes_on(source.surface.info):
-        say_notes(notes)
-        say_heights(source.inputs)
+        say_notes(notes, Wording(units))
+        say_heights(source.inputs, units)
 
 
 def _say_fleet(plan: Plan, units: Units) -> None:

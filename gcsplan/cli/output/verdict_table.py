@@ -149,6 +149,9 @@ def say_homes(homes: Mapping[str, WayHome], units: Units) -> None:
     for (autopilot, best_m), words in known.items():
         if best_m is not None:
             say(f"{words} {unit.symbol} above home: {setting(autopilot, best_m)}")
+    routes = [h.advice for h in homes.values() if h.safe is True and h.route == "mission"]
+    for note in dict.fromkeys(note for note in routes if note is not None):
+        say(f"by the mission: {note.text(Wording(units))}")
     say_warnings(homes, Wording(units))
 
 

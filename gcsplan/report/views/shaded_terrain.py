@@ -5,8 +5,9 @@ from __future__ import annotations
 import base64
 import io
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import contourpy
 import numpy as np
@@ -27,6 +28,8 @@ LATTICE = 9
 SHAPE = (0.45, 1.3)
 """Least and greatest height over width of the map, so that it fits a page and a screen."""
 NO_GROUND = 65535
+PATCH_SIDE, PATCH_MARGIN = 48, 0.25
+"""Heights along each side of a `GroundPatch`, and its margin as a part of half its longer side."""
 
 TINTS = (
     (0.00, (172, 193, 152)), (0.25, (205, 209, 162)), (0.50, (224, 205, 160)),
@@ -126,7 +129,7 @@ def relief_of(world: World, extent: MapExtent, unit: Unit = METRE) -> Relief:
     coarse = slice(None, None, CONTOUR_EVERY)
     contours, interval = _contours(ground[coarse, coarse], east[coarse], north[coarse], extent, (low, high), unit)
     return Relief(
-        extent, low, high, _picture(ground, east, north, low, high), contours, interval,
+        extent, low, high, picture_of(ground, east, north, low, high), contours, interval,
         float(east[GRID_EVERY] - east[0]), bool(known.all()),
         _grid(world, extent, ground[::GRID_EVERY, ::GRID_EVERY], low, high),
     )  # fmt: skip
@@ -138,11 +141,15 @@ def tints(part: Floats) -> Floats:
     return np.stack([np.interp(part, at, colours[:, k]) for k in range(3)], axis=-1)
 
 
-def _picture(ground: Floats, east_m: Floats, north_m: Floats, low: float, high: float) -> str:
-    """The shaded ground as WebP in a data URI."""
+def picture_of(
+    ground: Floats, east_m: Floats, north_m: Floats, low: float, high: float, *, clear: bool = False
+) -> str:  # fmt: skip
+    """The shaded ground as WebP in a data URI; with ``clear``, unknown ground is not painted."""
     colour = np.rint(shaded(ground, east_m, north_m, low, high)).astype(np.uint8)
+    if clear:
+        colour = np.dstack([colour, np.where(np.isnan(ground), 0, 255).astype(np.uint8)])
     buffer = io.BytesIO()
-    Image.fromarray(colour, "RGB").save(buffer, "WEBP", quality=78, method=2)
+    Image.fromarray(colour, "RGBA" if clear else "RGB").save(buffer, "WEBP", quality=78, method=2)
     return "data:image/webp;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")
 
 
@@ -191,18 +198,80 @@ def nice_step(at_least: float) -> float:
 
 
 def _grid(world: World, extent: MapExtent, ground: Floats, low: float, high: float) -> dict[str, object]:
-    """Heights as 16-bit steps, and latitudes and longitudes on a coarse lattice, to interpolate linearly."""
-    base, step = (low, max((high - low) / 65000.0, 1e-4)) if math.isfinite(low) else (0.0, 1.0)
-    whole = np.where(np.isnan(ground), NO_GROUND, np.clip(np.nan_to_num((ground - base) / step), 0, 65000))
+    """Packed heights, and latitudes and longitudes on a coarse lattice, to interpolate linearly."""
     lattice = np.meshgrid(
         np.linspace(extent.west_m, extent.east_m, LATTICE), np.linspace(extent.north_m, extent.south_m, LATTICE)
     )
     degrees = world.frame.to_degrees(*lattice)
     return {
-        "cols": ground.shape[1], "rows": ground.shape[0], "base": round(base, 3), "step": step, "unknown": NO_GROUND,
-        "heights": base64.b64encode(np.rint(whole).astype("<u2").tobytes()).decode("ascii"),
+        **packed(ground, low, high),
         "box": [round(v, 3) for v in (extent.west_m, extent.south_m, extent.east_m, extent.north_m)],
         "lattice": LATTICE,
         "lat": [round(float(v), 7) for v in degrees[..., 0].ravel()],
         "lon": [round(float(v), 7) for v in degrees[..., 1].ravel()],
     }  # fmt: skip
+
+
+def packed(ground: Floats, low_m: float, high_m: float) -> dict[str, object]:
+    """Heights (rows, cols) as 16-bit steps from ``low_m``; NaN, or no height at all, is `NO_GROUND`."""
+    base, step = (low_m, max((high_m - low_m) / 65000.0, 1e-4)) if math.isfinite(low_m) else (0.0, 1.0)
+    whole = np.where(np.isnan(ground), NO_GROUND, np.clip(np.nan_to_num((ground - base) / step), 0, 65000))
+    return {
+        "cols": ground.shape[1], "rows": ground.shape[0], "base": round(base, 3), "step": step, "unknown": NO_GROUND,
+        "heights": base64.b64encode(np.rint(whole).astype("<u2").tobytes()).decode("ascii"),
+    }  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class GroundPatch:
+    """The ground under one mission of a batch, coarsely: packed heights, and the box of degrees that they fill."""
+
+    box_deg: tuple[float, float, float, float]
+    """South, west, north, east; a box across 180° ends east of it."""
+    heights: Mapping[str, Any]
+
+    @classmethod
+    def under(cls, world: World, tracks: Sequence[Sequence[Sequence[float]]]) -> GroundPatch | None:
+        """The ground around tracks of [latitude, longitude]; None without a track, or known ground."""
+        places = np.array([p for track in tracks for p in track])
+        if not len(places):
+            return None
+        lons = places[0, 1] + (places[:, 1] - places[0, 1] + 180.0) % 360.0 - 180.0
+        shrink = max(math.cos(math.radians(float(places[:, 0].mean()))), 0.05)
+        low, high = (np.array([f(places[:, 0]), f(lons)]) for f in (np.min, np.max))
+        half = 0.5 * (high - low) * np.array([1.0, shrink])
+        half = (np.maximum(half, 0.5 * half.max()) + PATCH_MARGIN * half.max() + 1e-4) / np.array([1.0, shrink])
+        (south, west), (north, east) = 0.5 * (low + high) - half, 0.5 * (low + high) + half
+        lattice = np.meshgrid(np.linspace(north, south, PATCH_SIDE), np.linspace(west, east, PATCH_SIDE), indexing="ij")
+        plane = world.frame.to_plane(*lattice)
+        ground = world.airspace.surface.ground_at(plane[..., 0], plane[..., 1])
+        if np.isnan(ground).all():
+            return None
+        box_deg = float(south), float(west), float(north), float(east)
+        return cls(box_deg, packed(ground, float(np.nanmin(ground)), float(np.nanmax(ground))))
+
+    def at(self, lat_deg: Floats, lon_deg: Floats) -> Floats:
+        """(rows, cols) heights AMSL, m, over latitudes (rows,) and longitudes (cols,); NaN outside or unknown.
+
+        They are smoothed, so that the picture has no edges where two heights are joined.
+        """
+        one, (south, west, north, east) = self.heights, self.box_deg
+        whole = np.frombuffer(base64.b64decode(str(one["heights"])), "<u2").reshape(one["rows"], one["cols"])
+        unknown = whole == one["unknown"]
+        ground = np.where(unknown, float(one["base"]), one["base"] + one["step"] * whole)
+        y = _spline_weights((north - lat_deg) / (north - south), ground.shape[0])
+        x = _spline_weights((lon_deg - west) / (east - west), ground.shape[1])
+        hidden = ~(y @ unknown.astype(float) @ x.T <= 1e-9)  # outside too, where weights are NaN
+        return np.where(hidden, np.nan, y @ ground @ x.T)
+
+
+def _spline_weights(part: Floats, count: int) -> Floats:
+    """(N, count) weights of a uniform cubic B-spline at ``part`` 0 … 1 of its length; NaN outside."""
+    at = np.where((part >= 0.0) & (part <= 1.0), part * (count - 1.0), np.nan)
+    first = np.nan_to_num(np.floor(at)).clip(0, count - 2).astype(int)
+    t = at - first
+    each = ((1.0 - t) ** 3, 3.0 * t**3 - 6.0 * t**2 + 4.0, -3.0 * t**3 + 3.0 * t**2 + 3.0 * t + 1.0, t**3)
+    weights = np.zeros((len(at), count))
+    for k, weight in enumerate(each):
+        np.add.at(weights, (np.arange(len(at)), np.clip(first + k - 1, 0, count - 1)), weight / 6.0)
+    return weights

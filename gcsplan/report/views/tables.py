@@ -305,7 +305,7 @@ def inputs_table(inputs: Mapping[str, object], facts: Sequence[tuple[str, str]],
     for key, value in inputs.items():
         if value is None or key == "dem_kind":  # which stands in the words of bare_dem
             continue
-        words = esc(value)  # a text as files have it
+        words = esc(in_units(value, units) if isinstance(value, str) else value)
         if key == "bare_dem":
             words = esc(what_is_not_in(inputs, model="") or "obstacle heights were given")
         elif key == "resolution_m" and isinstance(value, int | float):

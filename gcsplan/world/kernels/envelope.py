@@ -156,7 +156,14 @@ def pieces(
                 strip, own = ii >> SHIFT, ii & MASK
                 edge = under.slope[strip, jj, own] < 0.0 or beside.slope[strip, jj, own] < 0.0
                 if edge or beyond.slope[strip, jj, own] < 0.0:
-                    cuts = max(cuts, math.ceil((tb - t) * run / NEAR_UNKNOWN_M))
+                    fa_, fb_ = fa + (fb - fa) * t, fa + (fb - fa) * tb
+                    widest = widen + max(low_m, max(near_m, far_m))
+                    d, _ = unknown_near(
+                        m, top, beyond.gaps, beyond.cols, beyond.rows, e0 + (e1 - e0) * fa_, n0 + (n1 - n0) * fa_,
+                        e0 + (e1 - e0) * fb_, n0 + (n1 - n0) * fb_, widest, ii, jj, widest,
+                    )  # fmt: skip
+                    if d < widest:
+                        cuts = max(cuts, math.ceil((tb - t) * run / NEAR_UNKNOWN_M))
                 cuts = min(max(cuts, 1), MOST_CUTS)
                 g_bulge, t_bulge = 0.25 * gd * turn / (cuts * cuts), 0.25 * td * turn / (cuts * cuts)
                 u, v = min(max(c0 + t * dc - ii, 0.0), 1.0), min(max(r0 + t * dr - jj, 0.0), 1.0)

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 
 from gcsplan.figures import floored, raised
 from gcsplan.notes.note import Note
+from gcsplan.units import Quantity, UnitText
 from gcsplan.world.geodesy.height_unit import HeightUnit
 
 ABSENT = {
@@ -29,18 +30,21 @@ def notes_on(info: Mapping[str, object]) -> tuple[Note, ...]:
     return notes
 
 
-def heights_read(units: Iterable[HeightUnit], datum: str, low_m: float, high_m: float) -> str:
-    """How heights were read: ``US survey feet, from the file; NAVD88; ground 160–440 m``.
+def heights_read(units: Iterable[HeightUnit], datum: str, low_m: float, high_m: float) -> UnitText:
+    """How heights were read: ``US survey feet, from the file; NAVD88; ground 160–440 m AMSL``.
 
     ``units`` come from all files, ``low_m`` and ``high_m`` are the lowest and the highest ground that was loaded.
     """
     stated = " and ".join(dict.fromkeys(unit.stated() for unit in units))
     low, high = floored(low_m, 0), raised(high_m, 0)
-    ends = f"{high:.0f}" if low == high else f"{low:.0f}{' to ' if low < 0.0 else '–'}{high:.0f}"
-    return f"{stated}; {datum}; ground {ends} m AMSL"
+    if low == high:
+        return UnitText("{}; {}; ground {}", stated, datum, Quantity(low, "amsl", 0))
+    to = " to " if low < 0.0 else "–"
+    ends = Quantity(low_m, "amsl", 0, "down", bare=True), to, Quantity(high_m, "amsl", 0, "up")
+    return UnitText("{}; {}; ground {}{}{}", stated, datum, *ends)
 
 
 def heights_line(inputs: Mapping[str, object]) -> str | None:
     """The line of a surface's ``info`` or a report's inputs: ``heights: …``; None if they lack it."""
     read = inputs.get("heights_read")
-    return f"heights: {read}" if isinstance(read, str) else None
+    return UnitText("heights: {}", read) if isinstance(read, str) else None

@@ -46,18 +46,23 @@ def test_the_energy_objective_spends_no_more_than_the_shortest_way() -> None:
 @pytest.mark.parametrize(
     ("battery", "key"),
     [({"battery_wh": 10}, "battery_wh"), ({"battery_mah": 500, "battery_v": 22.2}, "battery_mah"),
-     ({"battery_j": 9000}, "battery_j")],
+     ({"battery_j": 9000}, "battery_j"), ({"battery_wh": 10, "endurance_min": 6}, "battery_wh"),
+     ({"battery_mah": 700, "battery_v": 14.8, "endurance_s": 300}, "battery_mah")],
 )  # fmt: skip
 def test_a_battery_is_refused_with_one_in_its_own_unit_that_would_do(battery: dict[str, float], key: str) -> None:
     vehicle = yaml.safe_load(mission())["vehicles"][0]
-    energy = {"horizontal_j_per_m": 100, "vertical_j_per_m": 120, "reserve": 0.25}
+    lasts = any(name.startswith("endurance") for name in battery)  # says what cruising takes
+    energy = {"vertical_j_per_m": 120, "reserve": 0.25} | ({} if lasts else {"horizontal_j_per_m": 100})
     with pytest.raises(NoMission, match="battery") as refused:
         plan(mission(vehicles=[vehicle | {"energy": energy | battery}]))
-    found = re.search(rf"{key}: ([0-9.]+) would do", str(refused.value))
+    found = re.search(rf"{key}: ([0-9.]+)(?: with endurance_min: ([0-9.]+).*)? would do", str(refused.value))
     assert found is not None
+    assert lasts == (found[2] is not None)
     assert refused.value.reason == "battery"
     for part, passes in ((1.0, True), (0.98, False)):
-        enough = battery | {key: part * float(found[1])}
+        enough = {"battery_v": battery.get("battery_v"), key: part * float(found[1])}
+        if lasts:
+            enough["endurance_min"] = part * float(found[2])
         try:
             plan(mission(vehicles=[vehicle | {"energy": energy | enough}]))
             assert passes

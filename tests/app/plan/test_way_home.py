@@ -47,7 +47,11 @@ def test_where_no_altitude_helps_a_path_back_is_proposed() -> None:
     assert home.path_back is not None
     assert home.path_back.code == "path_back_makes_safe"
     assert str(home.path_back).startswith("return_route: mission writes a return path back along the track")
-    assert str(home.path_back) in "\n".join(warnings({"uav1": home}))
+    lines = "\n".join(warnings({"uav1": home}))
+    assert str(home.path_back) not in lines  # it is the best of the proposals, and said there
+    assert [lines.count(str(p.note)) for p in home.proposals] == [1] * len(home.proposals)
+    assert lines.count("return_route: mission") == 1
+    assert lines.count("RTL_ALT 5000") == sum("RTL_ALT 5000" in str(p.note) for p in home.proposals)
     assert home.as_dict()["path_back"] == str(home.path_back)
     assert ("instead", home.path_back) in [(row.label, row.note) for row in home.rows()]
 

@@ -663,4 +663,28 @@ def test_a_straight_climb_of_kilometres_offers_circles_which_climb_near_the_star
     }
     assert made.data["circled_m"] == offer.data["up_m"]
     assert circles.verdict.safe is True
+    assert offer.data["length_m"] == pytest.approx(circles.verdict.length_m, rel=0.01)
     assert [n.code for n in circles.notes if n.code == "circles_instead"] == []
+    assert "this was tried: the mission is safe" in str(offer)
+
+
+def test_a_climbing_circle_whose_mission_is_not_safe_is_not_offered(monkeypatch: pytest.MonkeyPatch) -> None:
+    real, tried = wings.built, []
+
+    def built(*given: Any) -> Any:
+        mission, verdict = real(*given)
+        if given[1].climb_out != "circles":
+            return mission, verdict
+        tried.append(given[1].climb_out)
+        return mission, replace(verdict, not_judged=(Note("limit_assumed", limit="min_agl_m", value=1.0),))
+
+    monkeypatch.setattr(wings, "built", built)
+    vehicle = {
+        "name": "w1", "sysid": 1, "autopilot": "arduplane", "start": [47.0, 8.0], "goal": [47.0, 8.06],
+        "turn_radius_m": 80, "speed_m_s": [14, 20], "end": "loiter",
+    }  # fmt: skip
+    whole = {"version": 1, "terrain": {"flat_m": 100}, "limits": {"min_agl_m": 150, "max_climb_deg": 6}}
+    (straight,) = plan(load_mission(whole | {"vehicles": [vehicle]})).vehicles
+    assert one("climb_out", straight.notes).data["far_m"] > 1000.0  # type: ignore[operator]
+    assert tried != []
+    assert [n.code for n in straight.notes if n.code == "circles_instead"] == []

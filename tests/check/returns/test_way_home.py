@@ -138,8 +138,8 @@ def test_lines_home_that_are_judged_a_few_at_once_give_the_same(
     counted_at_once: list[int] = []
     over = level_lines.over
 
-    def counting(*arguments: Any) -> level_lines.LevelLines:
-        met = over(*arguments)
+    def counting(*arguments: Any, **named: Any) -> level_lines.LevelLines:
+        met = over(*arguments, **named)
         counted_at_once.append(len(met.piece_line))
         return met
 

@@ -103,6 +103,14 @@ def test_a_plan_says_what_changed_since_the_last_one_and_since_the_mission_on_bo
     assert last["earlier_breaks_data"][0]["code"]
 
 
+@pytest.mark.slow
+def test_a_vehicle_without_a_mission_is_named_and_not_compared(run: Any) -> None:
+    with SimServer([vehicle()], "udpin:127.0.0.1:0", speedup=10.0) as server:
+        code, out, err = run("plan", CROSSING, "--compare-to", server.url_for_gcs, "--json")
+    assert (code, json.loads(out)["differences"]) == (0, [])
+    assert "uav1: there is no mission on board to compare with" in err
+
+
 @pytest.mark.parametrize("where", ["sim", "uav9=udpout:127.0.0.1:1", "link"])
 def test_a_wrong_mission_to_compare_with_is_refused_before_planning(run: Any, tmp_path: Path, where: str) -> None:
     assert run("plan", CROSSING, "--compare-to", where)[0] == 2
