@@ -30,7 +30,7 @@ MOST_NAMES = 2000
 WORST = (70, 7, 6, 5, 4, 3, 2, 0)
 """Exit codes from the worst to the best."""
 
-NoMissionReason = Literal["infeasible", "not_found", "time", "separation", "battery", "too_many_items"]
+NoMissionReason = Literal["infeasible", "not_found", "time", "separation", "battery", "wind", "too_many_items"]
 
 
 ProblemCode = Literal["", "unknown_key", "missing", "missing_limit", "swapped"]

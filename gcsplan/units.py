@@ -123,6 +123,14 @@ def duration(seconds: float | None, decimals: int = 0) -> str:
     return f"-{text}" if seconds < 0.0 and parts else text
 
 
+def span(window_s: tuple[float, float] | None, decimals: int = 0) -> str:
+    """A window of times, each as `duration` has it, rounded outward; a dash if there is none."""
+    if window_s is None:
+        return "–"
+    earliest_s, latest_s = window_s
+    return f"{duration(floored(earliest_s, decimals), decimals)} to {duration(raised(latest_s, decimals), decimals)}"
+
+
 # -- texts that name quantities ---------------------------------------------------------------------------------------
 
 Rounding = Literal["near", "down", "up"]

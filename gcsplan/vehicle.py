@@ -18,6 +18,12 @@ GRAVITY_M_S2 = 9.80665
 DEFAULT_LEAN_DEG, LARGEST_LEAN_DEG = 30.0, 80.0
 """ArduCopter's largest lean angle: its default, and the most that it accepts."""
 
+PX4_TILT_DEG = 45.0
+"""PX4's MPC_TILTMAX_AIR, default: the most that it tilts in flight."""
+
+AIRSPEED_SPARE = 1.2
+"""Assumed highest airspeed of a vehicle whose lean is not known, per its fastest cruise: its reserve against wind."""
+
 COPTER_RETURN_WAITS_S = 5.0  # ArduCopter RTL_LOIT_TIME, default
 LEAN_DEG_PER_M_S = 3.0
 """Lean that an ArduCopter needs for 1 m/s of cruise speed, against its drag: its speed was measured to end near 10 m/s
@@ -236,6 +242,14 @@ class Vehicle:
     def keeps_airspeed(self) -> bool:
         """Whether its speed is the airspeed that it indicates, along its path: a fixed wing's."""
         return self.autopilot is Autopilot.ARDUPLANE and self.turn_radius_m > 0.0
+
+    @property
+    def largest_lean_deg(self) -> float | None:
+        """How far a multicopter leans at most; None if that is not known.
+
+        A PX4 is taken for an airframe with the drag of ArduPilot's simulated quadrotor, as an ArduCopter is.
+        """
+        return PX4_TILT_DEG if self.smooths else self.lean_angle_deg
 
     @property
     def can_hold(self) -> bool:

@@ -95,7 +95,7 @@ def check(
         return {
             v.name: judge(
                 v.mission, v.request.vehicle, what.world, rtl_rel_home_m=v.request.rtl_rel_home_m,
-                terrain_error_m=what.source.terrain_error_m,
+                terrain_error_m=what.source.terrain_error_m, wind=what.source.flight_wind,
             )
             for v in what.vehicles
         }  # fmt: skip

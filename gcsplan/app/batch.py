@@ -40,6 +40,7 @@ __all__ = [
     "BatchOptions",
     "MissionBatch",
     "Record",
+    "columns_of",
     "exit_code",
     "missions_of",
     "record_of",
@@ -319,6 +320,14 @@ BATCH_COLUMNS = (
 )  # fmt: skip
 """The columns of the table of results."""
 
+WINDOW_COLUMNS = ("arrive_earliest_s", "arrive_latest_s")
+"""The last columns of the table, where a mission declares winds."""
+
+
+def columns_of(rows: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
+    """The columns of the table of these results."""
+    return BATCH_COLUMNS + (WINDOW_COLUMNS if any(column in row for row in rows for column in WINDOW_COLUMNS) else ())
+
 
 def _refusal(name: str, code: int, reason: str, message: str, vehicle: str = "") -> dict[str, Any]:
     verdict = {3: "no mission", 4: "not safe"}.get(code, "error")
@@ -331,7 +340,7 @@ def _rows(name: str, summary: str) -> list[dict[str, Any]]:
     for done in json.loads(summary)["vehicles"]:
         row = {"mission": name, "vehicle": done["name"], "code": 0, "reason": "", "message": ""}
         row |= {"return_safe": done.get("way_home", {}).get("safe")}
-        rows.append(row | {key: done[key] for key in BATCH_COLUMNS if key in done})
+        rows.append(row | {key: done[key] for key in BATCH_COLUMNS + WINDOW_COLUMNS if key in done})
     return rows
 
 

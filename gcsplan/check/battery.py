@@ -6,6 +6,9 @@ and for what the vehicle goes on before it turns home (`motion.stopping`), the b
 at most linear (`LegFigures.lead_j`), and the energy of the return is convex, because the distance to home and the climb
 to the return's altitude are. So their sum exceeds a limit at most on two parts of a leg, one at each end, and bisection
 finds where it crosses the limit, without sampling.
+
+In declared winds all of this is for the worst of them, leg by leg, and for the return alone; it stays convex
+(`flight.winds.WaysHome`).
 """
 
 from __future__ import annotations
@@ -16,9 +19,10 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import Any
 
-from gcsplan.check.motion.return_rules import RETURN_RULES, return_s
+from gcsplan.check.flight.winds import WaysHome
+from gcsplan.check.motion.return_rules import RETURN_RULES, return_s, speed_home_m_s
 from gcsplan.check.motion.stopping import detour_home_m
-from gcsplan.check.motion.stretch import Place, flat_m
+from gcsplan.check.motion.stretch import Place, flat_m, offset_m
 from gcsplan.check.verdict import LegFigures, Verdict
 from gcsplan.figures import raised
 from gcsplan.notes.note import Note
@@ -100,15 +104,24 @@ def battery_home(verdict: Verdict, vehicle: Vehicle, home: Place, return_amsl_m:
     if energy.battery_j is None or not verdict.legs:
         return None
     usable = (1.0 - energy.reserve) * energy.battery_j
+    ways = None
+    if verdict.in_wind is not None:
+        highest_m = max(return_amsl_m, *(leg.end[2] for leg in verdict.legs))
+        ways = WaysHome(vehicle, verdict.in_wind.wind, (home[2], max(home[2], highest_m)))
 
     def back_j(at: Place, speed_m_s: float, stands: bool) -> float:
         level = rule.level_amsl_m(return_amsl_m, at[2])
         down_m = max(level - home[2], 0.0)
-        way_m = flat_m(at, home) + (0.0 if stands else detour_home_m(vehicle, vehicle.speed_max_m_s, at[2]))
-        waits_j = energy.hold_w() * vehicle.return_waits_s
+        past_m = 0.0 if stands else detour_home_m(vehicle, vehicle.speed_max_m_s, at[2])
+        air_m = way_m = flat_m(at, home) + past_m
+        wind_m_s = 0.0
+        if ways is not None:
+            wind_m_s = ways.wind_m_s
+            air_m, way_m = ways.longer_m(speed_home_m_s(vehicle, speed_m_s), offset_m(at, home), past_m)
+        waits_j = energy.hold_w(wind_m_s) * vehicle.return_waits_s
         # The metres are the same with any base power; without one the time counts nothing.
         seconds = return_s(vehicle, way_m, level - at[2], down_m, speed_m_s) if energy.base_w else math.nan
-        return energy.under_way_j(abs(level - at[2]) + down_m, way_m, seconds) + waits_j
+        return energy.under_way_j(abs(level - at[2]) + down_m, air_m, seconds) + waits_j
 
     spent = along = most = 0.0
     most_at, most_m = verdict.legs[0].start, 0.0

@@ -18,17 +18,20 @@ from gcsplan.arrays import Floats, Indices
 from gcsplan.check.fixed_wing.ends import slant_findings
 from gcsplan.check.flight.corners import round_corners
 from gcsplan.check.flight.follow import follow
-from gcsplan.check.flight.times import seconds_of
+from gcsplan.check.flight.times import FlightTimes
+from gcsplan.check.flight.winds import Costs, FlightInWind
 from gcsplan.check.margins import enough, nearest_misses, nearest_pass
 from gcsplan.check.motion.project import PlaneLegs, legs_in_plane, steep_report, why_unknown, with_error_of_home
 from gcsplan.check.motion.stretch import Flight, Stretch, degree_m
 from gcsplan.check.motion.turn_parameters import DEFAULTS, Tuning
-from gcsplan.check.verdict import LegFigures, Verdict
+from gcsplan.check.verdict import JudgedWind, LegFigures, Verdict
 from gcsplan.mavlink.mission.autopilots import needs_straight, profile_of
 from gcsplan.mavlink.mission.mission import Home, Mission
 from gcsplan.mavlink.mission.parameter_list import FlightExtent
 from gcsplan.notes.note import Finding, Note
 from gcsplan.vehicle import Autopilot, Vehicle
+from gcsplan.wind.declared import FlightWind
+from gcsplan.wind.wording import gusts_note
 from gcsplan.world.airspace import LegReport, Legs, Violation
 from gcsplan.world.geodesy.frame import EARTH_RADIUS_M, FARTHEST_M
 from gcsplan.world.geometry.limits import Limits
@@ -54,12 +57,14 @@ def judge(
     misses: bool = False,
     times: bool = True,
     tuning: Tuning = DEFAULTS,
+    wind: FlightWind | None = None,
 ) -> Verdict:
     """Judge ``mission`` for ``vehicle`` in ``world``; never raises for a mission that is merely unsafe.
 
     ``misses``: also report how near it comes to each limit (half as much work again). ``times``: without them the legs'
     ``time_s`` are NaN, unless a limit hangs on them; a third of the work. ``tuning``: the parameters that
-    decide where the autopilot turns, if they were read from the vehicle.
+    decide where the autopilot turns, if they were read from the vehicle. ``wind``: the declared winds, in which it must
+    be able to fly, and whose worst counts for its energy; None: still air.
     """
     table = profile_of(mission.autopilot)
     stored = replace(mission, items=tuple(table.stored(item) for item in mission.items))
@@ -68,17 +73,7 @@ def judge(
         return Verdict(mission, (), (), (unsure, *flight.not_judged), tuple(flight.notes))
     limits, vehicle = vehicle.limits, with_error_of_home(vehicle, mission.home, world)
     home_error_m = vehicle.limits.altitude_error_m - limits.altitude_error_m
-    findings: list[Finding] = []
-    count = len(mission.wire_items())
-    if table.max_items is not None and count > table.max_items:
-        findings.append(
-            _finding(
-                0, "too_many_items",
-                Note("too_many_items", count=count, autopilot=mission.autopilot.value, most=table.max_items),
-                float(count), float(table.max_items), float(count - table.max_items), "items",
-            )
-        )  # fmt: skip
-    findings += _refused(mission) + _unreached(flight)
+    findings = [*_too_many(mission), *_refused(mission), *_unreached(flight)]
     if not flight.stretches:
         flight.not_judged.append(Note("flies_nowhere"))
         return Verdict(mission, (), tuple(findings), tuple(flight.not_judged), tuple(flight.notes))
@@ -96,9 +91,15 @@ def judge(
     if mission.autopilot is Autopilot.PX4:
         radius_m = {seq: tuning.px4_accepts_m(i)[0] for seq, i in enumerate(stored.items, stored.first_seq)}
     seconds = np.full(len(flight.stretches), math.nan)
-    if times or flight.loop_seq is not None or vehicle.energy.base_w:  # the battery depends on them
-        seconds = seconds_of(flight.stretches, vehicle, world, home, radius_m)
-    figures = _figures(flight, plane, report, vehicle, world, seconds)
+    blown: FlightInWind | None = None
+    if times or wind or flight.loop_seq is not None or vehicle.energy.base_w:  # the battery depends on them
+        clock = FlightTimes(flight.stretches, vehicle, world, home, radius_m)
+        seconds = clock.seconds()
+        if wind is not None and not wind.declared.still:
+            blown = FlightInWind(flight.stretches, clock, vehicle, wind, _agl_m(plane, report, len(flight.stretches)))
+    costs = None if blown is None or blown.too_windy is not None else blown.costs
+    figures = _figures(flight, plane, report, vehicle, world, seconds, costs)
+    findings += _blown_away(blown)
     findings += _findings(flight.stretches, plane, report, vehicle.limits, world)
     over = nearest_pass(flight.stretches, plane.legs, plane.owner, vehicle.limits, world)
     near = nearest_misses(flight.stretches, plane.legs, plane.owner, report, vehicle, world) if misses else ()
@@ -114,14 +115,40 @@ def judge(
         flight.notes.append(Note("straight_legs_until"))
     if any(s.terrain for s in flight.stretches):
         flight.notes.append(Note("reads_terrain_on_board", spacing_m=world.post_spacing_m, error_m=terrain_error_m))
-    flight.notes += [Note("paper_energy")] if vehicle.energy.papers else []
-    flight.notes += [Note("no_ceiling")] if vehicle.limits.max_agl_m is None else []
+    said = {
+        "judged_in_wind": costs is not None, "paper_energy": vehicle.energy.papers,
+        "no_ceiling": vehicle.limits.max_agl_m is None,
+    }  # fmt: skip
+    flight.notes += [Note(code) for code, holds in said.items() if holds]
     verdict = Verdict(
         mission, figures, tuple(findings), tuple(flight.not_judged), tuple(flight.notes), misses=near, zone_pass=over,
         energy_stated=vehicle.energy.stated, paper_energy=vehicle.energy.papers,
         extent=extent_of([*flight.stretches, *others], flown, mission.home, limits, home_error_m),
+        in_wind=None if blown is None else JudgedWind(blown.flies_in, blown.window if costs else None),
     )  # fmt: skip
-    return _with_battery(verdict, vehicle, flight)
+    return _with_battery(verdict, vehicle, flight, costs)
+
+
+def _agl_m(plane: PlaneLegs, report: LegReport, count: int) -> Floats:
+    """(N, 2) the lowest and highest height above ground of each stretch; NaN where some of its ground is not known."""
+    found = np.tile([math.inf, -math.inf], (count, 1))
+    np.minimum.at(found[:, 0], plane.owner, report.min_agl_m)
+    np.maximum.at(found[:, 1], plane.owner, report.max_agl_m)
+    return found
+
+
+def _blown_away(blown: FlightInWind | None) -> list[Finding]:
+    """The finding on a wind in which the aircraft cannot fly."""
+    if blown is None or (bad := blown.too_windy) is None:
+        return []
+    s, wind = blown.stretches[bad.stretch], blown.flies_in.declared
+    lat, lon, amsl = s.end
+    note = Note(
+        "wind_too_strong", s.seq, way=s.kind, wind_m_s=bad.speed_m_s, from_deg=bad.from_deg,
+        gusts=gusts_note(wind), up_to_m_s=bad.up_to_m_s,
+    )  # fmt: skip
+    by_m_s = wind.most_m_s - bad.up_to_m_s
+    return [Finding(s.seq, "wind", note, lat, lon, amsl, wind.most_m_s, bad.up_to_m_s, by_m_s, "m/s")]
 
 
 def _unlike_fitted(stretches: Sequence[Stretch], vehicle: Vehicle) -> list[Note]:
@@ -134,6 +161,15 @@ def _unlike_fitted(stretches: Sequence[Stretch], vehicle: Vehicle) -> list[Note]
     speed = max(far, key=lambda v: max(slow / max(v, 1e-9), v / fast))
     fitted = (slow,) if slow == fast else (slow, fast)
     return [Note("energy_fitted_elsewhere", far[speed], fitted=fitted, speed_m_s=speed)]
+
+
+def _too_many(mission: Mission) -> list[Finding]:
+    """The finding on more items than the autopilot takes."""
+    count, most = len(mission.wire_items()), profile_of(mission.autopilot).max_items
+    if most is None or count <= most:
+        return []
+    note = Note("too_many_items", count=count, autopilot=mission.autopilot.value, most=most)
+    return [_finding(0, "too_many_items", note, float(count), float(most), float(count - most), "items")]
 
 
 def _refused(mission: Mission) -> list[Finding]:
@@ -187,8 +223,10 @@ def _too_far(s: Stretch) -> Finding:
 
 
 def _figures(
-    flight: Flight, plane: PlaneLegs, report: LegReport, vehicle: Vehicle, world: World, seconds: Floats
-) -> tuple[LegFigures, ...]:
+    flight: Flight, plane: PlaneLegs, report: LegReport, vehicle: Vehicle, world: World, seconds: Floats,
+    costs: Costs | None,
+) -> tuple[LegFigures, ...]:  # fmt: skip
+    """The figures of each stretch; ``costs``: what they take in declared winds, None in still air."""
     energy = vehicle.energy
     delta = plane.legs.end - plane.legs.start
     runs, rises = np.hypot(delta[:, 0], delta[:, 1]), delta[:, 2]
@@ -217,10 +255,14 @@ def _figures(
         report.nearest_zone[near].tolist(), seconds.tolist(), strict=True,
     )  # fmt: skip
     figures = []
-    for s, run_m, length_m, rise_m, climb_deg, ground_m, agl_m, low_deg, top_m, clear_m, zone, time_s in rows:
+    for i, row in enumerate(rows):
+        s, run_m, length_m, rise_m, climb_deg, ground_m, agl_m, low_deg, top_m, clear_m, zone, time_s = row
         hold_s = 0.0 if math.isinf(s.hold_s) else s.hold_s
-        hold_j = _hold_w(vehicle, s) * hold_s
-        moving_j = energy.under_way_j(float(rise_m), float(run_m), time_s)
+        held_s, air_m, worst_s = hold_s, float(run_m), time_s
+        if costs is not None:
+            held_s, air_m, worst_s = float(costs.hold_s[i]), float(costs.air_m[i]), float(costs.seconds[i])
+        hold_j = _hold_w(vehicle, s, costs, i) * held_s
+        moving_j = energy.under_way_j(float(rise_m), air_m, worst_s)
         figures.append(
             LegFigures(
                 seq=s.seq, kind=s.kind, start=s.start, end=s.end, column=s.column, on_path=s.on_path,
@@ -239,7 +281,7 @@ def _figures(
                 hold_j=hold_j,
                 times=s.times,
                 jumped_from=s.jumped_from,
-                lead_j=_lead_j(vehicle, s, float(run_m), time_s),
+                lead_j=_lead_j(vehicle, s, float(run_m), worst_s, 0.0 if costs is None else float(costs.wind_m_s[i])),
                 speed_m_s=s.speed_m_s,
             )
         )  # fmt: skip
@@ -338,7 +380,7 @@ def _note_of(s: Stretch, v: Violation, zone: str, at: tuple[float, float], *, in
     )
 
 
-def _with_battery(verdict: Verdict, vehicle: Vehicle, flight: Flight) -> Verdict:
+def _with_battery(verdict: Verdict, vehicle: Vehicle, flight: Flight, costs: Costs | None) -> Verdict:
     energy = vehicle.energy
     if energy.battery_j is None:
         return verdict
@@ -348,11 +390,11 @@ def _with_battery(verdict: Verdict, vehicle: Vehicle, flight: Flight) -> Verdict
     if used > usable:
         note = Note(
             "battery_not_enough", needs_j=used, usable_j=usable, battery_j=energy.battery_j,
-            reserve_percent=100 * energy.reserve,
+            reserve_percent=100 * energy.reserve, windy=costs is not None,
         )  # fmt: skip
         finding = _finding(last.seq, "battery", note, used, usable, used - usable, "J")
         return replace(verdict, findings=(*verdict.findings, finding))
-    power_w = _power_w(verdict, vehicle, flight)
+    power_w = _power_w(verdict, vehicle, flight, costs)
     if power_w is None:
         return verdict
     if power_w <= 0.0:
@@ -362,7 +404,7 @@ def _with_battery(verdict: Verdict, vehicle: Vehicle, flight: Flight) -> Verdict
     return replace(verdict, notes=(*verdict.notes, note), until_reserve_s=left_s)
 
 
-def _power_w(verdict: Verdict, vehicle: Vehicle, flight: Flight) -> float | None:
+def _power_w(verdict: Verdict, vehicle: Vehicle, flight: Flight, costs: Costs | None) -> float | None:
     """The power, W, of a mission's last hold or round if that has no end; None if the mission ends."""
     if flight.loop_seq is not None:
         begun = max((i for i, leg in enumerate(verdict.legs) if leg.jumped_from == flight.loop_seq), default=0)
@@ -372,17 +414,19 @@ def _power_w(verdict: Verdict, vehicle: Vehicle, flight: Flight) -> float | None
     last = flight.stretches[-1]
     if not math.isinf(last.hold_s):
         return None
-    return _hold_w(vehicle, last)
+    return _hold_w(vehicle, last, costs, -1)
 
 
-def _hold_w(vehicle: Vehicle, s: Stretch) -> float:
-    """The power, W, of the hold at the end of a stretch: of hovering, or of circling if that takes more."""
+def _hold_w(vehicle: Vehicle, s: Stretch, costs: Costs | None, number: int) -> float:
+    """The power, W, of the hold at the end of a stretch: of hovering in the strongest wind, or of circling if that
+    takes more; ``number`` is the stretch's in ``costs``."""
     circling = s.kind == "loiter" and s.reach_m > 0.0
-    return vehicle.energy.hold_w(s.speed_m_s if circling else 0.0)
+    wind_m_s = 0.0 if costs is None or vehicle.keeps_airspeed else float(costs.wind_m_s[number])
+    return vehicle.energy.hold_w(wind_m_s + (s.speed_m_s if circling else 0.0))
 
 
-def _lead_j(vehicle: Vehicle, s: Stretch, run_m: float, time_s: float) -> float:
-    """Joules of base power by which a stretch may be ahead of an even share of its energy.
+def _lead_j(vehicle: Vehicle, s: Stretch, run_m: float, time_s: float, wind_m_s: float) -> float:
+    """Joules of base power by which a stretch may be ahead of an even share of its energy, in winds up to a speed.
 
     From any place on it the rest takes at least the rest's metres at top speed. So by then no more time has passed than
     the even share at top speed and the whole of what the stretch takes longer.
@@ -391,6 +435,7 @@ def _lead_j(vehicle: Vehicle, s: Stretch, run_m: float, time_s: float) -> float:
     if not base_w or not s.speed_m_s > 0.0:
         return 0.0
     top_m_s = vehicle.fastest_over_ground_m_s(s.speed_m_s, max(s.start[2], s.end[2]))
+    top_m_s += wind_m_s if vehicle.keeps_airspeed else 0.0
     return base_w * max(0.0, time_s - run_m / top_m_s)
 
 

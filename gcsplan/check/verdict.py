@@ -16,6 +16,8 @@ from gcsplan.notes.note import IN_FILES, Finding, Note, Wording
 
 if TYPE_CHECKING:
     from gcsplan.fleet.arrival import Slot
+    from gcsplan.wind.declared import FlightWind
+    from gcsplan.wind.window import TimeWindow
 
 
 PAPER_MARK = " (paper's figures)"
@@ -97,6 +99,17 @@ def _together(legs: Sequence[LegFigures]) -> LegFigures:
     )  # fmt: skip
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class JudgedWind:
+    """The winds that a flight was judged in. ``window`` is of the end of each leg, as `Verdict.clock_s` counts them.
+
+    None if the flight cannot be flown in one of them.
+    """
+
+    wind: FlightWind
+    window: TimeWindow | None
+
+
 @dataclass(frozen=True, slots=True)
 class Verdict:
     """The result of the check of ``mission`` (as sent), which judges the items as the autopilot stores them.
@@ -105,7 +118,9 @@ class Verdict:
     round without end, seconds until the battery is down to its reserve. ``zone_pass``: the nearest zone that is passed
     over or under. ``energy_stated``: the vehicle's energy was given; else energies say nothing and are not reported.
     ``paper_energy``: energies count the paper's numbers, for the vehicle's own were not given. ``extent``: the greatest
-    distances of the flight from home, errors counted; None where nothing was judged.
+    distances of the flight from home, errors counted; None where nothing was judged. ``in_wind``: the declared winds,
+    None for still air. Times are in still air; energies are those of the worst declared wind, leg by leg, or of still
+    air where that takes more.
     """
 
     mission: Mission
@@ -120,6 +135,7 @@ class Verdict:
     energy_stated: bool = True
     paper_energy: bool = False
     extent: FlightExtent | None = None
+    in_wind: JudgedWind | None = None
 
     def __repr__(self) -> str:
         return f"<Verdict of {self.mission.name!r}: {self.word}, {len(self.legs)} legs, {self.length_m:.0f} m>"
@@ -178,11 +194,35 @@ class Verdict:
     @property
     def arrive_s(self) -> float:
         """Seconds from leaving the ground to the end of the path (the goal at approach altitude)."""
+        last, stays_s = self._arrival
+        return math.fsum([*(leg.time_s * leg.times for leg in self.legs[: last + 1]), -stays_s])
+
+    def arrive_window_s(self, slot: Slot | None = None) -> tuple[float, float] | None:
+        """The earliest and the latest arrival in the declared winds, seconds; None in still air, or if it cannot fly.
+
+        From leaving the ground; with ``slot`` since the fleet's common start, at which ``arrive_s`` is in still air.
+        """
+        if self.in_wind is None or self.in_wind.window is None or not self.legs:
+            return None
+        last, stays_s = self._arrival
+        begins_s = 0.0 if slot is None else slot.arrive_s - self.arrive_s
+        ends = self.in_wind.window.earliest_s, self.in_wind.window.latest_s
+        return tuple(begins_s + float(s[last]) - stays_s for s in ends)  # type: ignore[return-value]
+
+    def leg_windows_s(self, slot: Slot | None = None) -> tuple[tuple[float, float], ...] | None:
+        """The earliest and latest end of each leg, likewise, from leaving the ground as in `clock_s`."""
+        if self.in_wind is None or self.in_wind.window is None:
+            return None
+        still = zip(self.clock_s(slot), self.clock_s(), strict=True)
+        ends = zip(self.in_wind.window.earliest_s.tolist(), self.in_wind.window.latest_s.tolist(), strict=True)
+        return tuple((early + a - b, late + a - b) for (a, b), (early, late) in zip(still, ends, strict=True))
+
+    @property
+    def _arrival(self) -> tuple[int, float]:
+        """The leg with which the path ends, -1 if there is none, and the seconds that it holds there."""
         last = max((i for i, leg in enumerate(self.legs) if leg.on_path), default=-1)
         stays_s = self.legs[last].hold_s if last >= 0 else 0.0
-        return math.fsum(
-            [*(leg.time_s * leg.times for leg in self.legs[: last + 1]), -stays_s if math.isfinite(stays_s) else 0.0]
-        )
+        return last, stays_s if math.isfinite(stays_s) else 0.0
 
     @property
     def gate_s(self) -> float:

@@ -12,7 +12,7 @@ import numpy as np
 from gcsplan.check.verdict import Verdict
 from gcsplan.export.rows import ItemRow
 from gcsplan.export.table import csv_of
-from gcsplan.figures import floored, steepened
+from gcsplan.figures import floored, raised, steepened
 from gcsplan.units import METRIC, Quantity, Units
 from gcsplan.world.world import World
 
@@ -30,7 +30,12 @@ PROFILE_COLUMNS: tuple[tuple[str, str, int], ...] = (
 )
 """Column, field of `ItemRow`, decimals; the columns follow vehicle, seq and command."""
 
-ROUNDED = {"agl_m": floored, "min_agl_on_leg_m": floored, "climb_deg": steepened}
+WIND_COLUMNS = (("earliest_s", "earliest_s", 2), ("latest_s", "latest_s", 2))
+"""The last columns, where winds are declared."""
+
+ROUNDED = {
+    "agl_m": floored, "min_agl_on_leg_m": floored, "climb_deg": steepened, "earliest_s": floored, "latest_s": raised
+}  # fmt: skip
 """The rounding of each field; the others are rounded to the nearest."""
 
 
@@ -39,9 +44,11 @@ GROUND, TRACK, BOTH, UNKNOWN = "█", "•", "▒", "?"
 
 def write_profile(rows: Iterable[ItemRow]) -> str:
     """The CSV text: a header and one line per row, with LF and a decimal point; unknown values are empty."""
-    lines: list[list[object]] = [["vehicle", "seq", "command", *(name for name, _, _ in PROFILE_COLUMNS)]]
+    rows = list(rows)
+    columns = PROFILE_COLUMNS + (WIND_COLUMNS if any(row.latest_s is not None for row in rows) else ())
+    lines: list[list[object]] = [["vehicle", "seq", "command", *(name for name, _, _ in columns)]]
     for row in rows:
-        numbers = [_cell(getattr(row, key), decimals, ROUNDED.get(key, round)) for _, key, decimals in PROFILE_COLUMNS]
+        numbers = [_cell(getattr(row, key), decimals, ROUNDED.get(key, round)) for _, key, decimals in columns]
         lines.append([row.vehicle, row.seq, row.command, *numbers])
     return csv_of(lines)
 

@@ -22,7 +22,10 @@ OUTLINE_MARGIN_M = 0.02
 
 @dataclass(frozen=True, slots=True)
 class ItemRow:
-    """One mission item in numbers; None or NaN if there is none (a command without a place, unknown ground)."""
+    """One mission item in numbers; None or NaN if there is none (a command without a place, unknown ground).
+
+    ``time_s``: in still air; ``earliest_s``, ``latest_s``: in the declared winds.
+    """
 
     vehicle: str
     seq: int
@@ -37,6 +40,8 @@ class ItemRow:
     energy_j: float | None = None
     cumulative_energy_j: float | None = None
     time_s: float | None = None
+    earliest_s: float | None = None
+    latest_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

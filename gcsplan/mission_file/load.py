@@ -469,7 +469,7 @@ class _MissionReading:
         else:
             wind = self._forecast(keys, hours, frame, places)
         if wind is not None and not wind.still:
-            self.notes += [wind_note(wind), Note("wind_not_counted")]
+            self.notes.append(wind_note(wind))
         return wind
 
     def _forecast(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
@@ -13,7 +14,7 @@ from gcsplan.mavlink.mission.return_parameters import ReturnRoute
 from gcsplan.mission_file.published.times import Hours
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import MissionEnd, Vehicle
-from gcsplan.wind.declared import STILL_AIR, DeclaredWind
+from gcsplan.wind.declared import STILL_AIR, DeclaredWind, FlightWind
 from gcsplan.world.geodesy.frame import Frame
 from gcsplan.world.geometry.surface import Surface
 from gcsplan.world.geometry.zones import Zone
@@ -150,6 +151,17 @@ class MissionFile:
     content: Content | None = None
     wind: DeclaredWind = STILL_AIR
     departure: datetime | None = None
+
+    @property
+    def flight_wind(self) -> FlightWind | None:
+        """The declared winds as each vehicle flies in them; None in still air.
+
+        One vehicle leaves at T+0; the vehicles of a fleet when their time table says.
+        """
+        if self.wind.still:
+            return None
+        begins_s = 0.0 if self.departure is None else self.departure.timestamp()
+        return FlightWind(self.wind, (begins_s, begins_s if len(self.vehicles) == 1 else math.inf))
 
     @property
     def changes(self) -> tuple[Note, ...]:

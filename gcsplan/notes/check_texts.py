@@ -314,8 +314,8 @@ CHECK_TEXTS = {
     ),
     "too_far_away": ("goes to {lat:.6f}, {lon:.6f}, {amsl_m:amsl.1}: too far from the mission's terrain to be judged"),
     "battery_not_enough": (
-        "battery: the flight needs {needs_j:joules} and {usable_j:joules} may be used ({battery_j:joules} less "
-        "{reserve_percent:g} % reserve)"
+        "battery: the flight needs {needs_j:joules}{windy: in the worst declared wind|} and {usable_j:joules} may be "
+        "used ({battery_j:joules} less {reserve_percent:g} % reserve)"
     ),
     "battery_that_would_do": "{key_name}: {enough}{lasts} would do for this path",
     "battery_lasts": " with {key_name}: {lasting_min:g} (the same power)",

@@ -74,7 +74,6 @@ INPUT_TEXTS = {
     "wind_is_one": "one wind during the whole flight",
     "wind_varies": "another one at each place and time",
     "wind_gusts": "; gusts up to {gust_m_s:speed.1}",
-    "wind_not_counted": "times, energies and paths of this version are for still air: the declared wind is not counted",
     "wind_of_forecast": (
         "wind by the forecast {file} for {lat_deg:.4f}, {lon_deg:.4f}, at most {away_m:reach} from the mission's "
         "places, {hours}"
@@ -110,6 +109,10 @@ INPUT_TEXTS = {
     "flies_beyond_hours": (
         "the hours of zones: zones that do not apply from {hours} were left out, and the flight from then on: it lasts "
         "to {until}; write at: [from, to] with all of the flight in it"
+    ),
+    "flies_beyond_forecast": (
+        "the hours of the forecast: the wind is known until {until}, and the flight is not surely over by then; write "
+        "at: [from, to] with all of the flight in it"
     ),
     "hours_without_landing": (
         "the hours of zones: zones that do not apply from {hours} were left out, and the flight from then on: it ends "

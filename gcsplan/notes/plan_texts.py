@@ -97,6 +97,19 @@ PLAN_TEXTS = {
         "{pairs} {pairs:pair|pairs} of start places {pairs:is|are} nearer than {needed_m:distance} (nearest: {first}, "
         "{second}: {apart_m:distance.1}): vehicles that wait on the ground are not judged against each other"
     ),
+    "judged_in_wind": (
+        "the aircraft can fly the mission in all declared winds; windows of times stand beside the times in still air, "
+        "energies are those of the worst wind on each leg, and paths and corners are judged as in still air"
+    ),
+    "wind_too_strong": (
+        "in a wind of {wind_m_s:speed.1} from {from_deg:.0f}°{gusts} the aircraft cannot keep its track; it can fly "
+        "the mission if the fastest of the declared winds has {up_to_m_s:speed.1 down}"
+    ),
+    "schedule_in_still_air": (
+        "the time table holds in still air alone: in the declared winds nothing keeps the vehicles apart or in their "
+        "order; {overlapping} {overlapping:pair|pairs} of neighbouring arrivals may change places, with windows that "
+        "overlap by up to {most_s:seconds.1}"
+    ),
     "no_arrival_asked": "the file asks for no `arrival`: the separation between vehicles is not judged",
     "nothing_keeps_apart": (
         "the file asks for no `arrival`, so nothing keeps the vehicles apart; released together, {met}"

@@ -33,7 +33,7 @@ from gcsplan.report.parts.page_data import Page, Subject
 from gcsplan.report.views.fleet import motions_of, separation_words
 from gcsplan.report.views.plan import COLOURS
 from gcsplan.report.views.shaded_terrain import Relief
-from gcsplan.units import Units, duration, in_units
+from gcsplan.units import Units, duration, in_units, span
 from gcsplan.world.terrain.model_words import what_is_not_in
 
 MOST_VEHICLES = 4
@@ -49,7 +49,7 @@ MARK_KINDS = ("start", "goal", "rally", "name")
 """The marks of the map that are on the briefing's, too."""
 MOST_PARAMETERS, MOST_WAY_POINTS = 30, 24
 """Most parameters, and most way points of all vehicles together, on the second page."""
-NOT_IN_IT = "Wind, emergency landing sites and moving obstacles are not in the model."
+NOT_IN_IT = "{wind}, emergency landing sites and moving obstacles are not in the model."
 
 
 def briefing_html(page: Page, verdict: tuple[str, str, str, str], relief: Relief, marks: Sequence[Mark]) -> str:
@@ -61,6 +61,7 @@ def briefing_html(page: Page, verdict: tuple[str, str, str, str], relief: Relief
     absent = what_is_not_in(page.inputs)
     bare = f"{esc(absent[0].upper() + absent[1:])}. " if absent else ""
     apart = separation_words(page)
+    wind = "Wind" if page.wind.code == "still_air" else "Tracks and corners in the wind"
     problems = _problems(page)
     high_mm = SMALL_MAP_MM if problems else MAP_MM
     return (
@@ -69,7 +70,7 @@ def briefing_html(page: Page, verdict: tuple[str, str, str, str], relief: Relief
         f'<p class="verdict {kind}"><b>{sign} {word}</b> {words}</p>'
         f"{problems}{_map(page, relief, marks, high_mm)}{_vehicles(page, shown)}"
         + "".join(f'<p class="fact">{text}</p>' for text in (more, _rally(page, shown), apart, _order(page)) if text)
-        + f'<p class="fact"><b>{bare}</b>{NOT_IN_IT} {_inputs(page)}</p>{_signatures()}</section>'
+        + f'<p class="fact"><b>{bare}</b>{NOT_IN_IT.format(wind=wind)} {_inputs(page)}</p>{_signatures()}</section>'
         + f'<section class="briefing" id="briefing-2"><p class="brand">mission briefing, second page</p>'
         f'<p class="fact">Wind: {esc(in_units(page.wind, page.units))}. {_daylight(page)}</p>'
         f"{_parameters(shown)}{_way_points(page, shown)}</section>"
@@ -210,6 +211,8 @@ def _facts(page: Page, s: Subject, units: Units) -> Iterator[tuple[str, str]]:
     yield "battery", _battery(s)
     yield "leaves", duration(s.depart_s)
     yield "at its goal", duration(s.arrive_s)
+    if s.window_s is not None:
+        yield "at its goal in the wind", span(s.window_s)
     if s.motion is not None:
         end = duration(s.motion.end_s)
         yield "on the ground", "stays in the air" if s.motion.ends_in_air else "flies on" if s.leaves else end

@@ -48,7 +48,7 @@ from gcsplan.report.views.replay import replay_data, replay_html, replay_of
 from gcsplan.report.views.scene_data import exaggeration, zone_meshes
 from gcsplan.report.views.shaded_terrain import Relief, extent_of, relief_of
 from gcsplan.report.views.tables import headline, rehearsal_html
-from gcsplan.units import KILOJOULE, Unit, Units, duration, in_units
+from gcsplan.units import KILOJOULE, Unit, Units, duration, in_units, span
 from gcsplan.world.geometry.zones import no_fly_of, on_map
 from gcsplan.world.terrain.model_words import what_is_not_in
 from gcsplan.world.world import World
@@ -217,6 +217,8 @@ def _card(subject: Subject, index: int, page: Page) -> str:
     since = "after the fleet's start" if in_fleet else "after take-off"
     if not in_fleet and subject.depart_s > 0.0:
         since = f"after the start, {duration(subject.depart_s)} of it on the ground"
+    if subject.window_s is not None:
+        since += f"; {span(subject.window_s, page.time_decimals)} in the declared winds"
     items = len(verdict.mission.wire_items())
     figures.append(
         (

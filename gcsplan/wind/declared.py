@@ -13,7 +13,7 @@ the nearest counts.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -75,6 +75,11 @@ class DeclaredWind:
         """How much a gust adds at most to any wind of the set, m/s."""
         return max((self.gust_m_s or 0.0) - self.most_m_s, 0.0)
 
+    def scaled(self, factor: float) -> DeclaredWind:
+        """The same set with all speeds, and the gusts, times ``factor``."""
+        gust_m_s = None if self.gust_m_s is None else factor * self.gust_m_s
+        return replace(self, speed_m_s=factor * self.speed_m_s, gust_m_s=gust_m_s)
+
     def vectors_m_s(self, shares: Floats, amsl_m: Floats, agl_m: Floats, at_s: Floats) -> Floats:
         """(K, N, 2) the wind's velocity, east and north, for ``shares`` (K, 2) at N heights and times.
 
@@ -86,18 +91,16 @@ class DeclaredWind:
         levels = np.stack([-speed * np.sin(angle), -speed * np.cos(angle)], axis=-1)  # towards where it blows
         return self._at(levels, amsl_m, agl_m, at_s)
 
-    def radius_m_s(self, cells: Floats, amsl_m: Floats, agl_m: Floats, at_s: Floats) -> Floats:
-        """(K, N) no wind of a cell of shares differs by more from the wind of the cell's middle, m/s.
+    def bow_m_s(self, cells: Floats, amsl_m: Floats, agl_m: Floats, at_s: Floats) -> Floats:
+        """(K, N) how far winds of cells of shares lie at most beyond the quadrangle of the winds at their corners, m/s.
 
-        ``cells`` (K, 2, 2): lower and upper share of speed, and of direction.
+        ``cells`` (K, 2, 2): lower and upper share of speed, and of direction. An arc of directions lies within its
+        speed times an eighth of the square of its angle of its chord, place by place.
         """
-        middle = cells.mean(axis=-1)
-        half = 0.5 * (cells[..., 1] - cells[..., 0])
-        spans = np.diff(self.speed_m_s)[..., 0], np.radians(np.diff(self.from_deg)[..., 0])
-        speed = self.speed_m_s[..., 0] + middle[:, 0, None, None] * spans[0]
-        # At most along the speed, then along the arc of the middle's speed.
-        radius = half[:, 0, None, None] * spans[0] + speed * half[:, 1, None, None] * spans[1]
-        return self._at(radius[..., None], amsl_m, agl_m, at_s)[..., 0]
+        turn = (cells[:, 1, 1] - cells[:, 1, 0])[:, None, None] * np.radians(np.diff(self.from_deg)[..., 0])
+        speed = self.speed_m_s[..., 0] + cells[:, 0, 1, None, None] * np.diff(self.speed_m_s)[..., 0]
+        bow = speed * np.minimum(0.125 * turn**2, 2.0)
+        return self._at(bow[..., None], amsl_m, agl_m, at_s)[..., 0]
 
     def _at(self, levels: Floats, amsl_m: Floats, agl_m: Floats, at_s: Floats) -> Floats:
         """(K, N, C) values of ``levels`` (K, T, L, C), interpolated linearly in time and height."""
@@ -120,3 +123,11 @@ def _between(nodes: Floats, x: Floats) -> tuple[np.ndarray, np.ndarray, Floats]:
     low, high = above - 1, np.minimum(above, len(nodes) - 1)
     width = np.where(high > low, nodes[high] - nodes[low], 1.0)
     return low, high, np.where(high > low, np.clip((x - nodes[low]) / width, 0.0, 1.0), 0.0)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class FlightWind:
+    """The wind of one flight, which leaves at a time between two: seconds UTC since 1970."""
+
+    declared: DeclaredWind
+    departs_s: tuple[float, float] = (0.0, 0.0)

@@ -19,8 +19,13 @@ def wind_note(wind: DeclaredWind) -> Note:
     return Note(
         "wind_declared", speeds=speeds_note(wind.speed_m_s), directions=directions_note(wind.from_deg),
         blows=Note("wind_varies" if wind.varying else "wind_is_one"),
-        gusts="" if wind.gust_m_s is None else Note("wind_gusts", gust_m_s=wind.gust_m_s),
+        gusts=gusts_note(wind),
     )  # fmt: skip
+
+
+def gusts_note(wind: DeclaredWind) -> Note | str:
+    """The gusts of a set, as the end of a sentence on its winds; nothing where none are declared."""
+    return "" if wind.gust_m_s is None else Note("wind_gusts", gust_m_s=wind.gust_m_s)
 
 
 def speeds_note(speed_m_s: Floats) -> Note:

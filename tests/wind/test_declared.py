@@ -61,10 +61,18 @@ def test_ranges_that_are_none_are_refused(speed, direction):
     st.floats(0, 1),
     st.floats(0, 1),
 )
-def test_no_wind_of_a_cell_lies_farther_from_its_middle_than_its_radius(speed, direction, ends, u, v):
+def test_every_wind_of_a_cell_is_near_the_quadrangle_of_its_corners(speed, direction, ends, u, v):
     wind = of(speed, direction)
     cell = np.array([sorted(ends[:2]), sorted(ends[2:])])
-    drawn = cell[:, 0] + np.array([u, v]) * (cell[:, 1] - cell[:, 0])
-    shares = np.stack([cell.mean(axis=1), drawn])
-    middle, other = wind.vectors_m_s(shares, NOWHERE, NOWHERE, NOWHERE)[:, 0]
-    assert math.dist(middle, other) <= wind.radius_m_s(cell[None], NOWHERE, NOWHERE, NOWHERE)[0, 0] + 1e-9
+    bow = wind.bow_m_s(cell[None], NOWHERE, NOWHERE, NOWHERE)[0, 0]
+    corners = wind.vectors_m_s(np.array([[s, d] for s in cell[0] for d in cell[1]]), NOWHERE, NOWHERE, NOWHERE)[:, 0]
+    share = cell[:, 0] + np.array([u, v]) * (cell[:, 1] - cell[:, 0])
+    drawn = wind.vectors_m_s(share[None], NOWHERE, NOWHERE, NOWHERE)[0, 0]
+    low, high = ((1.0 - v) * corners[k] + v * corners[k + 1] for k in (0, 2))
+    assert math.dist(drawn, (1.0 - u) * low + u * high) <= bow + 1e-9
+
+
+def test_a_scaled_set_has_all_its_speeds_and_gusts_scaled():
+    half = of((2, 6), (0, 90), gust_m_s=8.0).scaled(0.5)
+    assert half.speed_m_s.ravel().tolist() == [1.0, 3.0]
+    assert half.gust_m_s == 4.0

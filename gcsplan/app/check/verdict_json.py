@@ -10,6 +10,7 @@ from gcsplan.notes.note import IN_FILES, Wording, in_json
 
 if TYPE_CHECKING:
     from gcsplan.check.returns.verdict import WayHome
+    from gcsplan.fleet.arrival import Slot
 
 
 def verdict_of(name: str, verdict: Verdict, home: WayHome | None = None, wording: Wording = IN_FILES) -> dict[str, Any]:
@@ -28,6 +29,7 @@ def verdict_of(name: str, verdict: Verdict, home: WayHome | None = None, wording
         "battery_used_percent": verdict.battery_used_percent,
         "min_agl_m": lowest.min_agl_m if lowest else None,
         **extremes(verdict),
+        **arrival_window(verdict),
         "violations": [f.as_dict(wording) for f in verdict.findings],
         **in_json("not_judged", verdict.not_judged, wording),
         **in_json("notes", verdict.notes, wording),
@@ -45,6 +47,12 @@ def extremes(verdict: Verdict) -> dict[str, Any]:
         "zone_passed": {"zone": passed.zone, "side": passed.side, "leg": passed.seq} if passed else None,
         "max_climb_deg": verdict.max_climb_deg,
     }
+
+
+def arrival_window(verdict: Verdict, slot: Slot | None = None) -> dict[str, float]:
+    """The earliest and the latest arrival in the declared winds; nothing in still air."""
+    window_s = verdict.arrive_window_s(slot)
+    return {} if window_s is None else dict(zip(("arrive_earliest_s", "arrive_latest_s"), window_s, strict=True))
 
 
 def flat(figures: Any) -> dict[str, Any]:

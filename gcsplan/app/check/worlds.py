@@ -20,7 +20,7 @@ import numpy as np
 from gcsplan.app.check.fence_breaches import own_fence
 from gcsplan.app.check.rally_points import own_rally
 from gcsplan.app.fleet.pipeline import world_of
-from gcsplan.app.plan.flight_hours import beyond_hours
+from gcsplan.app.plan.flight_hours import beyond_forecast, beyond_hours
 from gcsplan.app.plan.way_home import home_of
 from gcsplan.arrays import Floats
 from gcsplan.check.flight.arc_waypoint import curve_bulge
@@ -38,6 +38,7 @@ from gcsplan.mission_file.published.times import Hours
 from gcsplan.notes.note import Note, Wording
 from gcsplan.units import Units
 from gcsplan.vehicle import Autopilot, Vehicle
+from gcsplan.wind.declared import FlightWind
 from gcsplan.world.geodesy.frame import FARTHEST_M
 from gcsplan.world.world import World
 
@@ -154,7 +155,7 @@ class MissionSite:
         error_m = source.terrain_error_m if source.altitude_frame == "terrain" else TERRAIN_ERROR_M
         if self._world is None:
             self._world = world_of(source)
-        return judged(request, file, read, self._world, error_m, parts, source.hours)
+        return judged(request, file, read, self._world, error_m, parts, source.hours, source.flight_wind)
 
     @property
     def sources(self) -> tuple[Mapping[str, object], tuple[Note, ...]]:
@@ -324,12 +325,12 @@ def _request(opened: OpenWorld, mission: Mission, name: str, world: World) -> Ve
 
 def judged(
     request: VehicleRequest, file: Path, read: MissionFileRead, world: World, terrain_error_m: float,
-    parts: VerdictParts, hours: Hours | None = None,
+    parts: VerdictParts, hours: Hours | None = None, wind: FlightWind | None = None,
 ) -> Checked:  # fmt: skip
     """Judge a mission that was read from ``file``, for a vehicle in a world. Raises InputError.
 
     ``hours``: the hours for which zones of the world were left out, from the departure on; the part of a flight beyond
-    them is not judged.
+    them is not judged. ``wind``: the declared winds; None: still air.
     """
     returns, asks_home = parts.returns, parts.returns.judged or parts.returns.required
     vehicle, mission = request.vehicle, read.mission
@@ -342,10 +343,10 @@ def judged(
     mission = replace(mission, name=vehicle.name, sysid=vehicle.sysid)
     verdict = judge(
         mission, vehicle, world, rtl_rel_home_m=request.rtl_rel_home_m, terrain_error_m=terrain_error_m,
-        misses=parts.misses, times=parts.times or asks_home or hours is not None,
+        misses=parts.misses, times=parts.times or asks_home or hours is not None, wind=wind,
     )  # fmt: skip
     verdict, fence_notes = own_fence(read.fence, verdict, vehicle, world)
-    more = [note for note in (read.unread_fence, beyond_hours(verdict, hours)) if note]
+    more = [note for note in (read.unread_fence, beyond_hours(verdict, hours), beyond_forecast(verdict)) if note]
     verdict = replace(verdict, not_judged=(*verdict.not_judged, *more))
     points = read.rally if returns.rally else ()
     verdict, rally_notes = own_rally(points, read.fence, verdict, request, world)

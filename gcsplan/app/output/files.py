@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from gcsplan import __version__
-from gcsplan.app.check.verdict_json import extremes
+from gcsplan.app.check.verdict_json import arrival_window, extremes
 from gcsplan.app.plan.model import FleetPlan, Plan, VehiclePlan
 from gcsplan.app.upload.on_board import settings_of_plan
 from gcsplan.arrays import Floats
@@ -235,6 +235,7 @@ def _vehicle(
         "speed_m_s": v.speed_m_s,
         "depart_s": slot.depart_s if slot else 0.0,
         "arrive_s": slot.arrive_s if slot else verdict.arrive_s,
+        **arrival_window(verdict, slot),
         "planning_s": v.solution.planning_s,
         "first_path_s": v.solution.first_path_s,
         "stopped_by": v.solution.stopped_by,
@@ -263,9 +264,13 @@ def item_rows(vehicle: str, verdict: Verdict, slot: Slot | None = None) -> list[
     depart_s = 0.0 if slot is None else slot.depart_s
     flown: dict[int, list[LegFigures]] = {}
     until: dict[int, float] = {}
-    for leg, clock_s in zip(verdict.legs, verdict.clock_s(slot), strict=True):
+    window: dict[int, tuple[float | None, float | None]] = {}
+    windows = verdict.leg_windows_s(slot)
+    for i, (leg, clock_s) in enumerate(zip(verdict.legs, verdict.clock_s(slot), strict=True)):
         flown.setdefault(leg.seq, []).append(leg)
         until[leg.seq] = depart_s + clock_s
+        if windows is not None:
+            window[leg.seq] = depart_s + windows[i][0], depart_s + windows[i][1]
     home = verdict.legs[0].start if verdict.legs else None
     rows, spent_j = [], 0.0
     for seq, item in enumerate(verdict.mission.wire_items()):
@@ -285,7 +290,7 @@ def item_rows(vehicle: str, verdict: Verdict, slot: Slot | None = None) -> list[
             ItemRow(
                 vehicle, seq, name, lat, lon, amsl, legs[-1].agl_end_m, min(low) if low else None,
                 math.fsum(leg.length_m for leg in legs), steep, verdict.reported_j(energy_j),
-                verdict.reported_j(spent_j), until[seq],
+                verdict.reported_j(spent_j), until[seq], *window.get(seq, (None, None)),
             )
         )  # fmt: skip
     return rows

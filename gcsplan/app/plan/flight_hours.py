@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from datetime import datetime, timedelta
+from datetime import UTC, datetime, timedelta
 
 from gcsplan.app.plan.model import FleetPlan, VehiclePlan
 from gcsplan.check.verdict import Verdict
@@ -42,11 +42,25 @@ def beyond_hours(verdict: Verdict, hours: Hours | None) -> Note | None:
     return None if end <= hours.end else Note("flies_beyond_hours", hours=str(hours), until=_shown(end))
 
 
+def beyond_forecast(verdict: Verdict, waits_s: float = 0.0) -> Note | None:
+    """Why the hours of a forecast do not hold the flight, which begins so long after T+0; None if they do."""
+    blown = verdict.in_wind
+    if blown is None or blown.window is None or len(blown.wind.declared.times_s) == 1:
+        return None
+    until_s = float(blown.wind.declared.times_s[-1])
+    lands = landing_of(verdict, datetime.fromtimestamp(until_s, UTC)) is not None
+    if lands and blown.wind.departs_s[0] + waits_s + float(blown.window.latest_s[-1]) <= until_s:
+        return None
+    return Note("flies_beyond_forecast", until=_shown(datetime.fromtimestamp(until_s, UTC)))
+
+
 def within_hours(source: MissionFile, flown: Sequence[VehiclePlan], fleet: FleetPlan) -> tuple[VehiclePlan, ...]:
-    """The vehicles of a plan; a flight without an end is not judged, if zones were left out for the hours.
+    """The vehicles of a plan; a flight without an end is not judged, if zones were left out for the hours, and none is
+    beyond those of a forecast of the wind.
 
     Raises InputError if a flight lasts beyond them.
     """
+    flown = [_not_judged(v, beyond_forecast(v.verdict, waits_s(v, fleet))) for v in flown]
     hours = source.hours
     if hours is None:
         return tuple(flown)
@@ -61,9 +75,14 @@ def within_hours(source: MissionFile, flown: Sequence[VehiclePlan], fleet: Fleet
                 f"{WRITE}",
                 where=f"{source.path}: at",
             )
-        why = () if end is not None else (Note("hours_without_landing", hours=str(hours)),)
-        judged.append(replace(v, verdict=replace(v.verdict, not_judged=(*v.verdict.not_judged, *why))))
+        judged.append(_not_judged(v, None if end is not None else Note("hours_without_landing", hours=str(hours))))
     return tuple(judged)
+
+
+def _not_judged(v: VehiclePlan, why: Note | None) -> VehiclePlan:
+    if why is None:
+        return v
+    return replace(v, verdict=replace(v.verdict, not_judged=(*v.verdict.not_judged, why)))
 
 
 def hours_left(source: MissionFile, v: VehiclePlan, fleet: FleetPlan | None) -> Hours | None:

@@ -90,8 +90,9 @@ def built(brief: Brief, request: VehicleRequest, solution: Solution, order: Orde
     mission = build_mission(solution.path, brief.world, vehicle, request.start_deg, order)
     _require_room(mission, vehicle)
     return mission, judge(
-        mission, vehicle, brief.world, rtl_rel_home_m=request.rtl_rel_home_m, terrain_error_m=source.terrain_error_m
-    )
+        mission, vehicle, brief.world, rtl_rel_home_m=request.rtl_rel_home_m, terrain_error_m=source.terrain_error_m,
+        wind=source.flight_wind,
+    )  # fmt: skip
 
 
 def _require_room(mission: Mission, vehicle: Vehicle) -> None:
@@ -111,6 +112,9 @@ def unsafe(verdict: Verdict, vehicle: Vehicle) -> NoMission:
         note = verdict.findings[0].note
         cure = _battery_that_would_do(verdict, vehicle.energy)
         return NoMission(f"{vehicle.name}: {note.in_units(METRIC)}; {cure}", reason="battery")
+    windy = next((f for f in verdict.findings if f.kind == "wind"), None)
+    if windy is not None:
+        return NoMission(f"{vehicle.name}: {windy.note.in_units(METRIC)}", reason="wind")
     items, first = verdict.mission.items, verdict.mission.first_seq
     returns = {i + first for i, item in enumerate(items) if item.command == cmd.RTL}
     if any(f.seq in returns for f in verdict.findings):

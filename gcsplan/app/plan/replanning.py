@@ -81,10 +81,10 @@ def replanned(attempts: Attempts, problem_of: Callable[[Margins], tuple[Problem,
 
 
 def on_path(mission: Mission, verdict: Verdict) -> list[Finding]:
-    """The findings that another path may cure: not those of the battery, the take-off, the landing or the return."""
+    """The findings that another path may cure: not those of wind, battery, take-off, landing and return."""
     items, first = mission.items, mission.first_seq
     flown = {i + first for i, item in enumerate(items) if item.command in (cmd.WAYPOINT, cmd.LOITER_UNLIM)}
-    return [f for f in verdict.findings if f.seq in flown and f.kind != "battery"]
+    return [f for f in verdict.findings if f.seq in flown and f.kind not in ("battery", "wind")]
 
 
 def larger(margins: Margins, findings: Sequence[Finding], corner_m: float = math.inf) -> Margins:

@@ -131,7 +131,10 @@ def judge_on_board(
         spacing = values.get("TERRAIN_SPACING", math.nan)
         spaced = world.with_posts(int(spacing)) if spacing >= 1.0 else world
         error_m = terrain_error_m(values, job.terrain_error_m)
-        verdict = judge(flown, flies, spaced, rtl_rel_home_m=rtl_rel_home_m, terrain_error_m=error_m, tuning=tuning)
+        wind = None if job.verdict is None or job.verdict.in_wind is None else job.verdict.in_wind.wind
+        verdict = judge(
+            flown, flies, spaced, rtl_rel_home_m=rtl_rel_home_m, terrain_error_m=error_m, tuning=tuning, wind=wind
+        )
         if not (verdict.safe is True or (verdict.safe is None and allow_unjudged)):
             unjudged = (Note("not_judged_on_board", why=note) for note in verdict.not_judged)
             return Note("breaks_limits_on_board", found=(*(f.note for f in verdict.findings), *unjudged))

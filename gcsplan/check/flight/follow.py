@@ -258,7 +258,7 @@ class _Pilot(Aboard):
         if plane:
             self.note(circle_widened(seq, reach_m, self.at[2]))
             reach_m *= circle_growth(self.at[2])
-        self.add(seq, "loiter", self.at, self.at, reach_m=reach_m, hold_s=hold_s)
+        self.add(seq, "loiter", self.at, self.at, reach_m=reach_m, hold_s=hold_s, turns=turns)
         self.direction = None
 
     def _circle(self, seq: int, radius_m: float) -> float:

@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -24,7 +25,7 @@ from gcsplan.world.geodesy.frame import Frame
 from gcsplan.world.terrain.vehicle_terrain import VehicleTerrain
 from gcsplan.world.world import World
 
-__all__ = ["over_ground", "pace_over_ground", "seconds_of"]
+__all__ = ["FlightTimes", "Parts", "over_ground", "pace_over_ground"]
 
 TERRAIN_STEP_M = 25.0
 """Longest piece, m, into which a leg that follows the ground is cut."""
@@ -40,24 +41,74 @@ overlap end this near to each other."""
 SLANTS_M = 0.01
 
 
-def seconds_of(
-    stretches: Sequence[Stretch], vehicle: Vehicle, world: World, home_deg: tuple[float, float],
-    radius_m: Mapping[int, float] = MappingProxyType({}),
-) -> Floats:  # fmt: skip
-    """(N,) seconds of each stretch, without the hold at its end; ``home_deg``: home's latitude and longitude.
+@dataclass(frozen=True, eq=False, slots=True)
+class Parts:
+    """The parts of a flight that are flown over ground, P of them, in the order flown.
+
+    ``start``, ``end`` (P, 3) are in metres of the plane, ``stretch`` (P,) numbers of stretches; ``speed_m_s`` (P,) is
+    the commanded speed: a fixed wing's indicated airspeed, others' speed over ground.
+    """
+
+    start: Floats
+    end: Floats
+    stretch: Indices
+    speed_m_s: Floats
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _StopToStop:
+    """Stretches ``first`` to ``last`` that are flown from one standstill to the next, over ground."""
+
+    first: int
+    last: int
+    points: Floats
+    owner: Indices
+    speed_m_s: Floats
+    keys: dict[str, Any]
+
+
+class FlightTimes:
+    """How long each of N stretches takes, without the hold at its end; ``home_deg``: home's latitude and longitude.
 
     ``radius_m``: acceptance radii of items, by seq, that are not the vehicle's own.
     """
-    _, ends = ends_of(stretches, world)
-    seconds = np.zeros(len(stretches))
-    home_m = world.ground_amsl(*home_deg)
-    home_amsl_m = None if math.isnan(home_m) else home_m
-    for first, last in _runs(stretches, ends):
-        if _upright(stretches[first], ends[first]):
-            seconds[first] = _column_s(stretches[first], ends[first], vehicle, home_amsl_m)
-        else:
-            seconds[first:last] = _legs_s(stretches[first:last], ends[first:last], vehicle, world, home_deg, radius_m)
-    return seconds
+
+    def __init__(
+        self, stretches: Sequence[Stretch], vehicle: Vehicle, world: World, home_deg: tuple[float, float],
+        radius_m: Mapping[int, float] = MappingProxyType({}),
+    ) -> None:  # fmt: skip
+        _, ends = ends_of(stretches, world)
+        self.vehicle = vehicle
+        self._columns_s = np.zeros(len(stretches))
+        self._runs: list[_StopToStop] = []
+        home_m = world.ground_amsl(*home_deg)
+        home_amsl_m = None if math.isnan(home_m) else home_m
+        for first, last in _runs(stretches, ends):
+            if _upright(stretches[first], ends[first]):
+                self._columns_s[first] = _column_s(stretches[first], ends[first], vehicle, home_amsl_m)
+            else:
+                self._runs.append(
+                    _run(first, stretches[first:last], ends[first:last], vehicle, world, home_deg, radius_m)
+                )
+
+    def seconds(self, ground_m_s: Floats | None = None) -> Floats:
+        """(N,) seconds in still air, or where the `parts` are flown at ``ground_m_s`` (P,) at most."""
+        seconds, done = self._columns_s.copy(), 0
+        for run in self._runs:
+            count = len(run.owner)
+            wind = None if ground_m_s is None else ground_m_s[done : done + count]
+            done += count
+            way = legs(run.points, self.vehicle, run.owner, **run.keys, pace=run.speed_m_s, ground_m_s=wind)
+            if way is not None:
+                seconds[run.first : run.last] = way.shares_s(1.0, run.last - run.first)
+        return seconds
+
+    @property
+    def parts(self) -> Parts:
+        """What is flown over ground."""
+        none = [np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, dtype=np.intp), np.zeros(0)]
+        rows = [(run.points[:-1], run.points[1:], run.owner + run.first, run.speed_m_s) for run in self._runs]
+        return Parts(*(np.concatenate(row) for row in zip(none, *rows, strict=True)))
 
 
 def _column_s(s: Stretch, ends: Floats, vehicle: Vehicle, home_amsl_m: float | None) -> float:
@@ -67,11 +118,10 @@ def _column_s(s: Stretch, ends: Floats, vehicle: Vehicle, home_amsl_m: float | N
     return math.fsum(part.time_s(s.speed_m_s) for part in parts)
 
 
-def _legs_s(
-    run: Sequence[Stretch], ends: Floats, vehicle: Vehicle, world: World, home_deg: tuple[float, float],
+def _run(
+    first: int, run: Sequence[Stretch], ends: Floats, vehicle: Vehicle, world: World, home_deg: tuple[float, float],
     radius_m: Mapping[int, float],
-) -> Floats:  # fmt: skip
-    """(N,) seconds of each of N stretches that are flown from one standstill to the next."""
+) -> _StopToStop:  # fmt: skip
     points, owner = np.concatenate([ends[:1, 0], ends[:, 1]]), np.arange(len(run), dtype=np.intp)
     follows = np.array([s.terrain for s in run])
     if follows.any():
@@ -80,12 +130,13 @@ def _legs_s(
     if vehicle.lays_curves:
         speed = speed * pace_over_ground(points, home_deg, world.frame)[:-1]
     own = (vehicle.climb_m_s, vehicle.descent_m_s)
-    stretch = legs(
-        points, vehicle, owner, np.array([s.seq for s in run], dtype=np.intp)[owner],
-        pace=speed, rates_m_s=np.array([s.rates_m_s or own for s in run])[owner],
-        radius_m=np.array([radius_m.get(s.seq, vehicle.acceptance_m) for s in run])[owner], follows=follows[owner],
-    )  # fmt: skip
-    return np.zeros(len(run)) if stretch is None else stretch.shares_s(1.0, len(run))
+    keys = {
+        "leg": np.array([s.seq for s in run], dtype=np.intp)[owner],
+        "rates_m_s": np.array([s.rates_m_s or own for s in run])[owner],
+        "radius_m": np.array([radius_m.get(s.seq, vehicle.acceptance_m) for s in run])[owner],
+        "follows": follows[owner],
+    }
+    return _StopToStop(first, first + len(run), points, owner, speed, keys)
 
 
 def _runs(stretches: Sequence[Stretch], ends: Floats) -> Iterator[tuple[int, int]]:

@@ -19,7 +19,8 @@ all of them: in the cone from the cone's altitude up to the return altitude, on 
 to the return altitude. Not judged: RTL_ALT_TYPE 1 (terrain), RTL_CLIMB_MIN, fences that cap the return, Q_RTL_MODE,
 missions with DO_LAND_START. `cone_differs` is judged in `returned` alone.
 
-`return_s` is for still air: what a base power (`gcsplan.vehicle.Energy`) needs to know of a return.
+`return_s` is what a base power (`gcsplan.vehicle.Energy`) needs to know of a return; a wind makes its way longer
+(`flight.winds.WaysHome`).
 """
 
 from __future__ import annotations
@@ -174,6 +175,12 @@ RETURN_OWN_METRES = 1.02
 """ArduPilot's own metres may be this much longer than those over ground, 150 km from home at most."""
 
 
+def speed_home_m_s(vehicle: Vehicle, speed_m_s: float) -> float:
+    """The speed of the flight home; ``speed_m_s``: the mission's where it begins (NaN: the vehicle's fastest)."""
+    own_m_s = vehicle.speed_max_m_s if math.isnan(speed_m_s) else speed_m_s
+    return own_m_s if vehicle.return_speed_m_s is None else min(own_m_s, vehicle.return_speed_m_s)
+
+
 def return_s(vehicle: Vehicle, way_m: float, rise_m: float, down_m: float, speed_m_s: float) -> float:
     """Seconds of a return without its wait over home: no fewer than the time table has (`fleet.motion.timing`).
 
@@ -181,8 +188,7 @@ def return_s(vehicle: Vehicle, way_m: float, rise_m: float, down_m: float, speed
     there to the ground at home; ``speed_m_s``: the mission's speed where it begins (NaN: the vehicle's fastest). The
     result is convex in the three lengths.
     """
-    own_m_s = vehicle.speed_max_m_s if math.isnan(speed_m_s) else speed_m_s
-    speed = own_m_s if vehicle.return_speed_m_s is None else min(own_m_s, vehicle.return_speed_m_s)
+    speed = speed_home_m_s(vehicle, speed_m_s)
     # A rate that is not bounded is the speed in space.
     climb, descent, land = (
         speed if math.isinf(rate) else rate for rate in (vehicle.climb_m_s, vehicle.descent_m_s, vehicle.land_m_s)

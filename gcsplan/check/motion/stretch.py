@@ -26,7 +26,8 @@ class Stretch:
     loiter's circle). ``on_path``: counts for the path's length, from the top of the take-off to the approach.
     ``rates_m_s``: of climb and descent; None: the vehicle's own. ``times``: how often it is flown, because a jump leads
     back. ``jumped_from``: the jump that led to it, for the first stretch after a jump. ``steep``: for a chord of a
-    curve, the curve's steepest rise over run, up and down (negative); None: the stretch is flown straight.
+    curve, the curve's steepest rise over run, up and down (negative); None: the stretch is flown straight. ``turns``:
+    its hold is of whole circles, not of seconds.
     """
 
     seq: int
@@ -44,6 +45,7 @@ class Stretch:
     times: int = 1
     jumped_from: int | None = None
     steep: tuple[float, float] | None = None
+    turns: bool = False
 
 
 @dataclass(frozen=True, slots=True)

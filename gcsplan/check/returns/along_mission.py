@@ -24,7 +24,8 @@ import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.check.battery import BatteryHome, LegBattery
-from gcsplan.check.motion.return_rules import RETURN_RULES, at_home_m, return_s
+from gcsplan.check.flight.winds import WaysHome
+from gcsplan.check.motion.return_rules import RETURN_RULES, at_home_m, return_s, speed_home_m_s
 from gcsplan.check.motion.stopping import about_turn_m, detour_home_m
 from gcsplan.check.motion.stretch import Stretch
 from gcsplan.check.returns.footprint import Target, places_of_returns
@@ -76,7 +77,10 @@ def return_by_mission(
 ) -> ByMission:
     """Judge the returns that join the mission at one of ``joins``; ``landing``: wire items of landings."""
     past = math.inf if joins.past_seq is None else joins.past_seq
-    judge = _Judge(trace, joins.joins, vehicle)
+    wind = verdict.in_wind
+    heights_m = float(trace.amsl.min()), float(trace.amsl.max())
+    ways = None if wind is None else WaysHome(vehicle, wind.wind, heights_m)
+    judge = _Judge(trace, joins.joins, vehicle, ways)
     length = float((trace.last - trace.first).sum())
     parts = trace.cut(max(FIRST_M, length / FIRST_PARTS))
     seq = trace.seq[parts.stretch]
@@ -113,8 +117,10 @@ def return_by_mission(
 class _Judge:
     """Judges ways to joins; ``legs`` counts the legs that it has looked at."""
 
-    def __init__(self, trace: MissionTrace, joins: Sequence[Join], vehicle: Vehicle) -> None:
-        self.trace, self.joins, self.vehicle = trace, joins, vehicle
+    def __init__(
+        self, trace: MissionTrace, joins: Sequence[Join], vehicle: Vehicle, in_wind: WaysHome | None
+    ) -> None:  # fmt: skip
+        self.trace, self.joins, self.vehicle, self.in_wind = trace, joins, vehicle, in_wind
         limits = vehicle.limits
         free = replace(
             limits, min_agl_m=0.0, max_agl_m=None, max_amsl_m=None, horizontal_clearance_m=0.0,
@@ -149,8 +155,13 @@ class _Judge:
         vehicle, speed = self.vehicle, self.trace.speed_m_s[parts.stretch]
         way_m = ways.away_m + ways.wide_m + detour_home_m(vehicle, vehicle.speed_max_m_s, float(self.trace.amsl.max()))
         rise_m, seconds = ways.rise_m, np.zeros(len(way_m))
+        slow_m = way_m
+        if self.in_wind is not None:  # in the worst direction
+            home_m_s = np.array([speed_home_m_s(vehicle, v) for v in speed.tolist()])
+            air, took_s = np.array([self.in_wind.worst(v) for v in home_m_s.tolist()]).reshape(-1, 2).T
+            way_m, slow_m = way_m * air, way_m * took_s * home_m_s
         if vehicle.energy.base_w:  # it climbs or descends: the slower of both
-            each = zip(way_m.tolist(), rise_m.tolist(), speed.tolist(), strict=True)
+            each = zip(slow_m.tolist(), rise_m.tolist(), speed.tolist(), strict=True)
             seconds[:] = [
                 max(return_s(vehicle, way, rise, 0.0, v), return_s(vehicle, way, -rise, 0.0, v))
                 for way, rise, v in each

@@ -26,7 +26,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Indices
-from gcsplan.check.flight.times import seconds_of
+from gcsplan.check.flight.times import FlightTimes
+from gcsplan.check.flight.winds import FlightInWind
 from gcsplan.check.motion.commands import LAND_STARTS
 from gcsplan.check.motion.stopping import levels_off_m
 from gcsplan.check.motion.stretch import Flight, Stretch, flat_m
@@ -36,6 +37,7 @@ from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Vehicle
+from gcsplan.wind.declared import FlightWind
 from gcsplan.world.airspace import Legs
 from gcsplan.world.world import World
 
@@ -88,14 +90,19 @@ def land_starts(mission: Mission, command: int) -> list[int]:
     return [k for k, item in enumerate(mission.items) if item.command == command]
 
 
-def joins_of(mission: Mission, flight: Flight, vehicle: Vehicle, world: World) -> Joins:
-    """The items of ``mission`` (as stored; ``flight`` is what `follow` makes of it) that a return may fly to first."""
+def joins_of(
+    mission: Mission, flight: Flight, vehicle: Vehicle, world: World, wind: FlightWind | None = None
+) -> Joins:  # fmt: skip
+    """The items of ``mission`` (as stored; ``flight`` is what `follow` makes of it) that a return may fly to first.
+
+    ``wind``: the declared winds, whose worst counts for the energy.
+    """
     paths, landings = (land_starts(mission, c) for c in LAND_STARTS)
     starts = tuple(mission.first_seq + k for k in (paths or landings))
     if not starts:
         one, other = (cmd.command_name(c) for c in LAND_STARTS)
         return Joins(False, (), why_not=(Note("nothing_to_join", one=one, other=other),))
-    finder = _Finder(mission, flight, vehicle, world)
+    finder = _Finder(mission, flight, vehicle, world, wind)
     if (jump := _jump_at_starts(mission, min(*paths, *landings, len(mission.items)))) is not None:
         finder.why_not.append(Note("jump_decides_join", jump))
     for k in paths:
@@ -131,6 +138,7 @@ class _Finder:
     flight: Flight
     vehicle: Vehicle
     world: World
+    wind: FlightWind | None = None
     why_not: list[Note] = field(default_factory=list)
     legs: dict[int, list[tuple[Floats, Floats]]] = field(default_factory=dict)
 
@@ -202,13 +210,21 @@ class _Finder:
         return None
 
     def _energy_j(self, stretches: Sequence[Stretch]) -> float:
-        energy, times = self.vehicle.energy, [math.nan] * len(stretches)
-        if energy.base_w and stretches:
+        energy, times = self.vehicle.energy, np.full(len(stretches), math.nan)
+        air_m = np.array([flat_m(s.start, s.end) for s in stretches])
+        hold_s, wind_m_s = np.array([s.hold_s for s in stretches]), np.zeros(len(stretches))
+        if (energy.base_w or self.wind) and stretches:
             home = self.mission.home.lat_e7 / 1e7, self.mission.home.lon_e7 / 1e7
-            times = seconds_of(stretches, self.vehicle, self.world, home).tolist()
+            clock = FlightTimes(stretches, self.vehicle, self.world, home)
+            times = clock.seconds()
+            if self.wind is not None:
+                unknown = np.full((len(stretches), 2), math.nan)
+                costs = FlightInWind(stretches, clock, self.vehicle, self.wind, unknown).costs
+                air_m, times, hold_s, wind_m_s = costs.air_m, costs.seconds, costs.hold_s, costs.wind_m_s
+        rise_m = [abs(s.end[2] - s.start[2]) for s in stretches]
+        rows = zip(rise_m, air_m.tolist(), times.tolist(), hold_s.tolist(), wind_m_s.tolist(), strict=True)
         return math.fsum(
-            energy.under_way_j(abs(s.end[2] - s.start[2]), flat_m(s.start, s.end), time_s) + energy.hold_w() * s.hold_s
-            for s, time_s in zip(stretches, times, strict=True)
+            energy.under_way_j(rise, way, took_s) + energy.hold_w(w) * held for rise, way, took_s, held, w in rows
         )
 
     def _place(self, item: MissionItem) -> Floats | None:

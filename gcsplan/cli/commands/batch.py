@@ -107,7 +107,7 @@ def batch(
 
 def _tables(out: Path, done: Sequence[Record], units: UnitsChoice, page: str) -> list[str]:
     """Write the table and the page of all results; returns their names."""
-    from gcsplan.app.batch import BATCH_COLUMNS
+    from gcsplan.app.batch import columns_of
     from gcsplan.cli.output.console import remark
     from gcsplan.export.outdir import write_whole
     from gcsplan.export.table import csv_text, parquet_bytes
@@ -118,13 +118,13 @@ def _tables(out: Path, done: Sequence[Record], units: UnitsChoice, page: str) ->
     tracks = [track for r in done for track in (*r.tracks, *[[]] * (len(r.rows) - len(r.tracks)))]
     drawn = {k: track for k, track in enumerate(tracks) if len(track) > 1}
     files: dict[str, str | bytes] = {
-        "results.csv": csv_text(BATCH_COLUMNS, rows),
+        "results.csv": csv_text(columns_of(rows), rows),
         "index.html": render_index(
             out.resolve().name, rows, drawn, [r.ground for r in done if r.ground is not None], units_of(units), page
         ),
     }
     try:
-        files["results.parquet"] = parquet_bytes(BATCH_COLUMNS, rows)
+        files["results.parquet"] = parquet_bytes(columns_of(rows), rows)
     except InputError as why:
         remark(f"note: results.parquet is not written: {why}")
     for name, content in files.items():

@@ -20,7 +20,7 @@ from gcsplan.cli.process.exit import put
 from gcsplan.figures import floored, raised, steepened
 from gcsplan.notes.note import IN_FILES, Note, Wording
 from gcsplan.notes.order import for_people
-from gcsplan.units import KILOJOULE, METRIC, WATT_HOUR, Unit, Units, charge, duration, in_units
+from gcsplan.units import KILOJOULE, METRIC, WATT_HOUR, Unit, Units, charge, duration, in_units, span
 from gcsplan.world.terrain.model_words import heights_line, notes_on, what_is_not_in
 
 if TYPE_CHECKING:
@@ -75,6 +75,8 @@ for screen in (console, aside):
 
 
 WIDEST = 100_000
+IN_WIND = "in the wind"
+"""The column of the arrivals in the declared winds."""
 MOST_WITH_ALL_COLUMNS = 30
 """Most vehicles whose table has all columns, and whose transfers have a bar each."""
 MOST_NOTES, MOST_NAMES = 120, 110
@@ -144,12 +146,12 @@ def verdict_cell(safe: bool | None, home: WayHome | None, units: Units, *, lines
 def plan_table(plan: Plan, homes: Mapping[str, WayHome], units: Units = METRIC) -> None:
     """Print a plan: a column for each vehicle, values beside their limits; a row for each in a large fleet."""
     rows = [plan_row(v, plan.fleet, homes.get(v.name), units, lines=len(plan.vehicles) > 1) for v in plan.vehicles]
-    for rare in ("energy, mAh", f"over or under a zone, {units.distance.symbol}"):  # mostly there is none
+    for rare in (IN_WIND, "energy, mAh", f"over or under a zone, {units.distance.symbol}"):  # mostly there is none
         if all(row[rare] == "–" for row in rows):
             rows = [{name: words for name, words in row.items() if name != rare} for row in rows]
     if len(rows) > MOST_WITH_ALL_COLUMNS:
         brief = _brief(units)
-        rows = [{name: row[name] for name in brief} for row in rows]
+        rows = [{name: row[name] for name in brief if name in row} for row in rows]
     title = f"[bold]{escape(plan.source.name)}[/]  planner {plan.planner}, objective {plan.objective}"
     if len(rows) > 4:
         rows_table(title, rows, left=("vehicle", "verdict"))
@@ -168,7 +170,7 @@ def _brief(units: Units) -> tuple[str, ...]:
     """The columns that the table of a larger fleet has."""
     return (
         "vehicle", f"length, {units.path.symbol}", "battery, %", f"lowest AGL, {units.height.symbol}",
-        f"speed, {units.speed.symbol}", "departs", "arrives", "verdict",
+        f"speed, {units.speed.symbol}", "departs", "arrives", IN_WIND, "verdict",
     )  # fmt: skip
 
 
@@ -197,14 +199,15 @@ def _say_fleet(plan: Plan, units: Units) -> None:
     closest = fleet.closest
     if fleet.separation is None:
         return
+    still = "" if plan.source.flight_wind is None else " in still air"
     unit = units.distance
     needed = f" of {unit.stated(arrival.separation_m)} {unit.symbol} required" if arrival is not None else ""
     if closest is None:
-        say("separation: no two vehicles are in the air at the same time")
+        say(f"separation{still}: no two vehicles are in the air at the same time")
     else:
         a, b = closest.vehicles
         near = f"{floored(unit.of(closest.distance_m), unit.decimals(1)):.{unit.decimals(1)}f} {unit.symbol}"
-        say(f"separation: {near}{needed}, {a} and {b} at T+{duration(closest.time_s, 1)}")
+        say(f"separation{still}: {near}{needed}, {a} and {b} at T+{duration(closest.time_s, 1)}")
 
 
 def _columns(title: str, rows: Sequence[Mapping[str, str]], each: int) -> list[Table]:
@@ -264,6 +267,7 @@ def plan_row(
         f"speed, {units.speed.symbol}": number(v.speed_m_s, 2, units.speed),
         "departs": duration(slot.depart_s if slot else 0.0, tenths) + held,
         "arrives": duration(slot.arrive_s if slot else verdict.arrive_s, tenths),
+        IN_WIND: span(verdict.arrive_window_s(slot), tenths),
         "verdict": verdict_cell(verdict.safe, home, units, lines=lines),
     }
 
@@ -294,11 +298,14 @@ def release_table(plan: Plan, results: Sequence[JobResult], gate: GateTime | Non
     if plan.fleet is None or len(plan.fleet.slots) < 2:
         return
     ready = {d.vehicle for d in results if d.verified and not d.code}
-    columns = [("vehicle", False), ("release, T+", True), ("at the goal, T+", True), ("", False)]
+    windows = {v.name: v.verdict.arrive_window_s(plan.fleet.slot(v.name)) for v in plan.vehicles}
+    windy = [(IN_WIND, True)] if any(windows.values()) else []
+    columns = [("vehicle", False), ("release, T+", True), ("at the goal, T+", True), *windy, ("", False)]
     table = new_table("[bold]release[/]  by hand: nothing is armed or started from here", columns)
     for slot in sorted(plan.fleet.slots, key=lambda s: s.depart_s):
         state = "" if slot.name in ready else "[bold red]not ready[/]"
-        table.add_row(escape(slot.name), duration(slot.depart_s, 1), duration(slot.arrive_s, 1), state)
+        window = [span(windows[slot.name], 1)] if windy else []
+        table.add_row(escape(slot.name), duration(slot.depart_s, 1), duration(slot.arrive_s, 1), *window, state)
     print_table(table)
     if gate is not None:
         say(f"T+0 is {gate.start:%Y-%m-%d %H:%M:%S} UTC")

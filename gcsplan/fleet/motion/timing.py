@@ -105,6 +105,7 @@ _LEAST_S = 1e-9
 def legs(
     points: Floats, vehicle: Vehicle, owner: Indices, leg: Indices | None = None, pace: Floats | None = None,
     rates_m_s: Floats | None = None, radius_m: Floats | None = None, follows: Bools | None = None,
+    ground_m_s: Floats | None = None,
 ) -> Motion | None:  # fmt: skip
     """The stretch through ``points`` (N, 3) without a stop; None if nothing moves.
 
@@ -112,7 +113,8 @@ def legs(
     1,) are one leg, cut to follow the ground or a curve; None: each part is a leg. ``pace`` (N - 1,) is the speed that
     results from a cruise speed of 1, if that is not 1. ``rates_m_s`` (N - 1, 2) are the rates of climb and descent on
     each part, ``radius_m`` (N - 1,) PX4's acceptance radius at its end, if they are not the vehicle's own; ``follows``
-    (N - 1,) the parts that follow the ground.
+    (N - 1,) the parts that follow the ground. ``ground_m_s`` (N - 1,) are the largest horizontal speeds in a wind,
+    which count in place of ``pace`` and of the largest lean angle.
 
     ArduPilot flies S-curves (`curved`) and PX4 smooths (`smoothed`) unless a motion key of the vehicle is not
     bounded; every other vehicle rounds its corners (`speeds`). A fixed wing keeps the airspeed that it indicates,
@@ -120,6 +122,8 @@ def legs(
     """
     if vehicle.keeps_airspeed:
         pace, rates_m_s = _in_air(points, vehicle, pace, rates_m_s)
+    if ground_m_s is not None:
+        pace, vehicle = ground_m_s, replace(vehicle, lean_angle_deg=None)
     if vehicle.lays_curves and math.isfinite(vehicle.corner_accel_m_s2):
         numbers = np.arange(len(owner), dtype=np.intp) if leg is None else leg
         return curved(points, vehicle, owner, numbers, pace, rates_m_s, follows)

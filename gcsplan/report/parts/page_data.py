@@ -81,6 +81,11 @@ class Subject:
         return self.slot.arrive_s if self.slot is not None else self.verdict.arrive_s
 
     @property
+    def window_s(self) -> tuple[float, float] | None:
+        """The earliest and latest arrival in the declared winds, counted as `arrive_s`; None in still air."""
+        return self.verdict.arrive_window_s(self.slot)
+
+    @property
     def homeless(self) -> bool:
         """Whether the return is not safe, or not judged."""
         return self.home is None or self.home.safe is not True

@@ -11,15 +11,19 @@ import numpy as np
 from gcsplan.arrays import Floats
 from gcsplan.fleet.motion.timing import TimedPath
 from gcsplan.report.parts.html import Mark, esc, least, num, stated, table, tools
-from gcsplan.report.parts.page_data import Page, only_some
+from gcsplan.report.parts.page_data import Page, Subject, only_some
 from gcsplan.report.views.chart import Axes, chart_html
 from gcsplan.report.views.plan import COLOURS
-from gcsplan.units import Units, duration
+from gcsplan.units import duration, span
 
 INSTANTS = 600
 MOST_PAIRS = 6
 """Most pairs that are drawn one by one; with more, only the nearest two at each time are drawn."""
 FLEET_TALL = 0.34
+BAND_WORDS = (
+    "<style>path.band { fill: var(--t); opacity: .25; stroke: none; }</style>"
+    '<p class="note">Lines are in still air; bands hold all declared winds at the way points.</p>'
+)
 
 
 def motions_of(page: Page) -> list[tuple[int, TimedPath]]:
@@ -35,7 +39,7 @@ def fleet_html(page: Page, charts: dict[str, object], full: frozenset[int]) -> s
     """
     motions = motions_of(page)
     if not motions:
-        return ""
+        return _one_in_wind(page, charts)
     times = instants(motions)
     words = "The distances are drawn at sampled moments, while both of two vehicles are in the air."
     return (
@@ -43,13 +47,35 @@ def fleet_html(page: Page, charts: dict[str, object], full: frozenset[int]) -> s
         + _schedule(page, motions)
         + "<h3>Way flown over time</h3>"
         + tools("distance")
-        + _distance_chart([m for m in motions if m[0] in full], times, charts, page.units)
+        + _distance_chart(page, [m for m in motions if m[0] in full], times, charts)
         + only_some(page, full)
         + "<h3>Separation over time</h3>"
         + tools("separation")
         + _separation_chart(page, motions, times, charts)
         + f'<p class="note">{words}</p></section>'
     )
+
+
+def _one_in_wind(page: Page, charts: dict[str, object]) -> str:
+    """The way of a single vehicle over time, if its mission declares winds."""
+    motions = [(i, s.motion) for i, s in enumerate(page.subjects) if s.motion is not None and s.window_s is not None]
+    if not motions:
+        return ""
+    chart = _distance_chart(page, motions, instants(motions), charts)
+    return f'<section id="fleet"><h2>The flight in time</h2>{tools("distance")}{chart}</section>'
+
+
+def _bands(page: Page, motions: Sequence[tuple[int, TimedPath]]) -> dict[int, Floats]:
+    """(L + 1, 3) by subject: metres flown at home and at each leg's end, and the earliest and latest time there."""
+    found = {}
+    for i, _ in motions:
+        s = page.subjects[i]
+        windows = s.verdict.leg_windows_s(s.slot)
+        if windows is not None:
+            run_m = np.cumsum([leg.horizontal_m * leg.times for leg in s.verdict.legs])
+            times_s = s.depart_s + np.array([(0.0, 0.0), *windows])
+            found[i] = np.column_stack([np.append(0.0, run_m), times_s])
+    return found
 
 
 def instants(motions: Sequence[tuple[int, TimedPath]]) -> Floats:
@@ -101,7 +127,8 @@ def _schedule(page: Page, motions: Sequence[tuple[int, TimedPath]]) -> str:
             (
                 f'<i class="swatch t{i % COLOURS}"></i>{esc(motion.name)}', str(order.get(motion.name, "–")),
                 duration(motion.begin_s, 1), duration(slot.hold_s if slot else None),
-                num(slot.speed_m_s if slot else None, 2, page.units.speed), duration(motion.arrive_s, 1),
+                num(slot.speed_m_s if slot else None, 2, page.units.speed),
+                duration(motion.arrive_s, 1) + _window(page.subjects[i], 1),
                 "in the air" if motion.ends_in_air else duration(motion.end_s, 1),
                 num(float(flown_m(motion, np.array([motion.end_s]))[0]), 0, page.units.path),
             )
@@ -120,6 +147,11 @@ def _schedule(page: Page, motions: Sequence[tuple[int, TimedPath]]) -> str:
     return table("Schedule: times since the fleet's common start, h:mm:ss", head, rows, numbers=of)
 
 
+def _window(subject: Subject, decimals: int) -> str:
+    """The window of the arrival, in brackets; empty in still air."""
+    return "" if subject.window_s is None else f" ({span(subject.window_s, decimals)} in the wind)"
+
+
 def separation_words(page: Page) -> str:
     """The fleet's exact least distance in a sentence of HTML; empty if none was judged."""
     found = page.separation
@@ -134,16 +166,27 @@ def separation_words(page: Page) -> str:
     a, b = found.least.vehicles
     near = f"{least(found.least.distance_m, 1, unit)} at {duration(found.least.time_s, 1)}"
     word = "kept" if found.safe else "<b>broken</b>"
-    return f"Separation {word}: {esc(a)} and {esc(b)} come nearest, {near} ({needed}; exact, not sampled)."
+    still = " in still air" if any(s.window_s is not None for s in page.subjects) else ""
+    return f"Separation {word}{still}: {esc(a)} and {esc(b)} come nearest, {near} ({needed}; exact, not sampled)."
 
 
 def _distance_chart(
-    motions: Sequence[tuple[int, TimedPath]], times: Floats, charts: dict[str, object], units: Units
+    page: Page, motions: Sequence[tuple[int, TimedPath]], times: Floats, charts: dict[str, object]
 ) -> str:
+    bands = _bands(page, motions)
+    latest_s = max((float(band[-1, 2]) for band in bands.values()), default=-math.inf)
+    if latest_s > times[-1]:
+        times = np.append(times, np.linspace(times[-1], latest_s, INSTANTS // 4)[1:])
     ways = [flown_m(m, times) for _, m in motions]
     longest = max(float(np.nanmax(w)) for w in ways)
-    axes = Axes(float(times[0]), float(times[-1]), 0.0, 1.05 * max(longest, 1.0), "time", "way flown", None, units.far)
-    shapes = [axes.line(times, w, f"track t{i % COLOURS}") for (i, _), w in zip(motions, ways, strict=True)]
+    axes = Axes(
+        float(times[0]), float(times[-1]), 0.0, 1.05 * max(longest, 1.0), "time", "way flown", None, page.units.far
+    )
+    shapes = [
+        axes.area(times, np.interp(times, b[:, 2], b[:, 0]), np.interp(times, b[:, 1], b[:, 0]), f"band t{i % COLOURS}")
+        for i, b in bands.items()
+    ]
+    shapes += [axes.line(times, w, f"track t{i % COLOURS}") for (i, _), w in zip(motions, ways, strict=True)]
     marks = []
     for i, m in motions:
         y = float(flown_m(m, np.array([min(max(m.arrive_s, m.begin_s), m.end_s)]))[0])
@@ -151,7 +194,7 @@ def _distance_chart(
         marks.append(axes.mark(m.arrive_s, y, f"goal t{i % COLOURS}", m.name, tip, 1))
     charts["distance"] = _numbers(times, [(m.name, "far", 3, w) for (_, m), w in zip(motions, ways, strict=True)])
     words = f"Way flown over time by {len(motions)} vehicles, from {duration(times[0])} to {duration(times[-1])}"
-    return chart_html("distance", axes, shapes, marks, words, FLEET_TALL)
+    return chart_html("distance", axes, shapes, marks, words, FLEET_TALL) + (BAND_WORDS if bands else "")
 
 
 def _separation_chart(

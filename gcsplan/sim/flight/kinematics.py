@@ -13,7 +13,7 @@ from functools import lru_cache
 import numpy as np
 
 from gcsplan.arrays import Floats
-from gcsplan.vehicle import GRAVITY_M_S2, Autopilot, Vehicle
+from gcsplan.vehicle import AIRSPEED_SPARE, GRAVITY_M_S2, Autopilot, Vehicle
 
 AT_ONCE_M_S2 = 1e4
 """Acceleration that stands for "unlimited", m/s²: 30 m/s in 3 ms."""
@@ -21,8 +21,6 @@ AT_ONCE_M_S2 = 1e4
 CURVE_PEAK_ACCEL = 2.5 / 1.5
 """Peak acceleration of an S-curve per acceleration of the trapezoid that it is equivalent to."""
 
-AIRSPEED_SPARE = 1.2
-"""Assumed highest airspeed of a vehicle, as a multiple of its fastest cruise: its reserve against wind."""
 FASTEST_LEANING_M_S = 60.0
 SLOPE_STEP, STEEPEST_STEPS, AMSL_STEP_M = 0.01, 50, 25.0
 """Slopes (rise per metre) and altitudes are rounded to these where only the airspeed depends on them."""

@@ -1,0 +1,405 @@
+"""A flight in the winds that its mission declares: where it cannot fly, its windows, and what it takes at most.
+
+The fleet's model of motion gives the times (`times.FlightTimes`), with each part at most as fast over ground as its
+winds allow (`gcsplan.wind`). Columns are flown as in still air. [Winds](docs/concepts/wind.md) has the definitions.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from gcsplan.arrays import Bools, Floats
+from gcsplan.check.flight.times import FlightTimes, Parts
+from gcsplan.check.motion.stretch import Stretch
+from gcsplan.figures import floored
+from gcsplan.fleet.motion.ardupilot import leaning_m_s
+from gcsplan.vehicle import AIRSPEED_SPARE, Vehicle
+from gcsplan.wind.ability import ADVANCES_M_S, Ability, WindsAlong, circle_ratio
+from gcsplan.wind.declared import DeclaredWind, FlightWind
+from gcsplan.wind.window import TimeWindow, cover, window
+from gcsplan.world.geodesy.atmosphere import true_per_indicated
+
+__all__ = ["Costs", "FlightInWind", "TooWindy", "WaysHome", "air_m_s", "gust_length_m"]
+
+UNEVEN_S, SHORT_M, EVEN_S = 0.35, 200.0, 0.02
+"""Legs of ArduPilot and PX4 that are shorter than `SHORT_M` may take this much longer at a higher speed, others
+`EVEN_S`: the most of 20,000 random flights was 0.33 s. Slower legs of the other models are never earlier."""
+
+COUPLED, COUPLED_SMOOTH = 2.0, 4.0
+"""Seconds by which speeding up and braking may be shorter where a part is 1 m/s faster, times the acceleration, m/s²;
+1.6 and 3.9 were the most of 6,000 random flights."""
+
+GUST_SIGMAS = 3.0
+"""The highest gust is this many standard deviations of the turbulence, and its share of a window is this many of the
+distance by which turbulence displaces an aircraft."""
+
+LOW_FT, HIGH_FT, FOOT_M = 10.0, 1000.0, 0.3048
+_TRIED_STEPS = 12
+_NO_RUN_M = 1e-6
+_RAYS = 64
+_RAY_RAD = 2.0 * math.pi / _RAYS
+
+
+@dataclass(frozen=True, slots=True)
+class TooWindy:
+    """The stretch on which a wind is too strong, that wind, and the highest speed of a set of its form that would do.
+
+    ``up_to_m_s`` was tried; with the gusts of the mission in proportion.
+    """
+
+    stretch: int
+    speed_m_s: float
+    from_deg: float
+    up_to_m_s: float
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Costs:
+    """What N stretches take at most: ``air_m`` (N,) metres through the air, ``seconds`` (N,) without the holds.
+
+    ``hold_s`` (N,) are the holds, ``wind_m_s`` (N,) is the highest speed of the wind there.
+    """
+
+    air_m: Floats
+    seconds: Floats
+    hold_s: Floats
+    wind_m_s: Floats
+
+
+def air_m_s(vehicle: Vehicle, speed_m_s: Floats, slope: Floats, amsl_m: Floats) -> tuple[Floats, Floats]:
+    """(P,) the least and the most that a vehicle's airspeed is bounded by, on parts that rise by ``slope`` (P,).
+
+    A fixed wing keeps its true airspeed. Others lean: level or along the slope, whichever is slower or faster, for the
+    slope through the air lies between.
+    """
+    if vehicle.keeps_airspeed:
+        true = speed_m_s * true_per_indicated(amsl_m)
+        return true, true
+    if vehicle.largest_lean_deg is None:
+        most = np.full(len(amsl_m), AIRSPEED_SPARE * vehicle.speed_max_m_s)
+        return most, most
+    slant = np.arctan(slope)
+    level, along = (leaning_m_s(vehicle.largest_lean_deg, angle, amsl_m) for angle in (np.zeros_like(slant), slant))
+    along = along * np.cos(slant)
+    return np.minimum(level, along), np.maximum(level, along)
+
+
+def gust_length_m(agl_m: float) -> float:
+    """The length of turbulence along the wind near the ground, by MIL-F-8785C; above `HIGH_FT` as there."""
+    feet = min(max(agl_m / FOOT_M, LOW_FT), HIGH_FT)
+    return float(FOOT_M * feet / (0.177 + 0.000823 * feet) ** 1.2)
+
+
+class FlightInWind:
+    """A flight's N stretches in the winds of a set; ``agl_m`` (N, 2): lowest and highest height above ground of each.
+
+    NaN where the ground is not known.
+    """
+
+    def __init__(
+        self, stretches: Sequence[Stretch], times: FlightTimes, vehicle: Vehicle, wind: FlightWind, agl_m: Floats
+    ) -> None:
+        self.stretches, self.times, self.vehicle, self.flies_in = stretches, times, vehicle, wind
+        self.wind, self._departs_s = wind.declared, wind.departs_s
+        self._agl_m = np.where(np.isnan(agl_m), [0.0, math.inf], agl_m)
+        self._parts = times.parts
+        self._ability, self._run_m = _ability(vehicle, self._parts)
+        self._still_s = times.seconds()
+
+    @cached_property
+    def too_windy(self) -> TooWindy | None:
+        """Where the aircraft cannot keep its track or its place, or does not advance, in some wind of the set, gusts
+        counted."""
+        bad = self._cannot(self.wind)
+        if bad is None:
+            return None
+        stretch, (east, north) = bad
+        most = self.wind.most_m_s
+        low, high = 0.0, 1.0
+        for _ in range(_TRIED_STEPS):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if self._cannot(self.wind.scaled(middle)) is None else (low, middle)
+        up_to_m_s = floored(low * most, 1)
+        while up_to_m_s > 0.0 and self._cannot(self.wind.scaled(up_to_m_s / most)) is not None:
+            up_to_m_s = floored(up_to_m_s - 0.1, 1)
+        come_from = math.degrees(math.atan2(-east, -north)) % 360.0
+        return TooWindy(stretch, math.hypot(east, north), come_from, up_to_m_s)
+
+    @cached_property
+    def window(self) -> TimeWindow:
+        """The window of the end of each stretch, its hold and its rounds included, and with the share of gusts."""
+        return self._timed[0]
+
+    @cached_property
+    def _timed(self) -> tuple[TimeWindow, Floats]:
+        """The window, and the hours (P, 2) in which each part is flown."""
+        hours_s = self._any_hour
+        found = self._windowed(hours_s)
+        if len(self.wind.times_s) > 1 and not (self._rounds > 1.0).any():
+            of = self._parts.stretch
+            begins = np.append(0.0, found.earliest_s[:-1])
+            hours_s = np.column_stack([begins[of], found.latest_s[of]]) + self._departs_s
+            found = self._windowed(hours_s)
+        return found, hours_s
+
+    @property
+    def _any_hour(self) -> Floats:
+        return np.tile([self._departs_s[0], math.inf], (len(self._run_m), 1))
+
+    def _windowed(self, hours_s: Floats) -> TimeWindow:
+        along = self._along(self.wind, hours_s)
+        found = window(along, self)
+        late_s, early_s = self._gust_s(along, found.latest_s)
+        earliest_s = np.maximum(found.earliest_s - early_s, 0.0)
+        if not self.vehicle.keeps_airspeed:  # no gust makes it faster than commanded
+            fastest = self._ability.most_m_s
+            earliest_s = np.maximum(earliest_s, np.minimum(found.earliest_s, self.between(fastest, fastest).earliest_s))
+        return TimeWindow(earliest_s, found.latest_s + late_s)
+
+    @cached_property
+    def costs(self) -> Costs:
+        """What each stretch takes at most with any wind of the set; no wind counts as a gain."""
+        # Without a forecast the window, which is a search, is not needed here.
+        hours_s = self._timed[1] if len(self.wind.times_s) > 1 else self._any_hour
+        along, cells = self._along(self.wind, hours_s), cover(self.wind)
+        air, _ = (c.max(axis=0) for c in along.costs(cells))
+        slow = along.speeds_m_s(cells)[0].min(axis=0)
+        moving_s = np.maximum(self.times.seconds(slow) + (not self.wind.single) * self._uneven_s, self._still_s)
+        late_s, _ = self._gust_s(along, self.between(slow, slow).latest_s)
+        later_s = np.diff(late_s, prepend=0.0) / self._rounds
+        stretch, count = self._parts.stretch, len(self.stretches)
+        air_m = np.bincount(stretch, weights=self._run_m * np.maximum(air, 1.0), minlength=count)
+        fastest = np.zeros(count)
+        np.maximum.at(fastest, stretch, self._ability.most_air_m_s)
+        wind_m_s = self._places(self.wind).strongest_m_s(cells)
+        return Costs(air_m + later_s * fastest, moving_s + later_s, self._held_s[1], wind_m_s)
+
+    @cached_property
+    def _held_s(self) -> tuple[Floats, Floats]:
+        """(N,) the shortest and the longest hold at the end of each stretch: whole circles take longer in a wind."""
+        hold = np.array([0.0 if math.isinf(s.hold_s) else s.hold_s for s in self.stretches])
+        least, most = hold.copy(), hold.copy()
+        slowest_m_s = 0.0 if self.wind.varying else float(self.wind.speed_m_s[..., 0].min())
+        for i, s in enumerate(self.stretches):
+            if s.turns and hold[i] > 0.0:
+                amsl_m, speed = np.array([s.end[2]]), np.array([s.speed_m_s])
+                bounds = air_m_s(self.vehicle, speed, np.zeros(1), amsl_m)
+                own = math.inf if self.vehicle.keeps_airspeed else s.speed_m_s
+                least[i] *= circle_ratio(slowest_m_s, float(bounds[1][0]), own)
+                most[i] *= circle_ratio(self.wind.most_m_s, float(bounds[0][0]), own)
+        return least, most
+
+    # -- a `FlightClock`, whose points are the ends of the stretches, with holds and rounds --------------------------
+
+    @property
+    def run_m(self) -> Floats:
+        """(P,) lengths of the parts over ground."""
+        return self._run_m
+
+    def summed(self, seconds: Floats) -> Floats:
+        """(..., N) the sums of seconds of parts (..., P) up to the end of each stretch."""
+        upto = np.searchsorted(self._parts.stretch, np.arange(len(self.stretches)), side="right")
+        sums = np.cumsum(seconds * self._rounds[self._parts.stretch], axis=-1)
+        return np.concatenate([np.zeros((*sums.shape[:-1], 1)), sums], axis=-1)[..., upto]
+
+    def loose_s(self, slow_m_s: Floats, fast_m_s: Floats) -> Floats:
+        """(N,) by how much what is beyond lengths over speeds may fall where speeds rise: at joints, where an aircraft
+        speeds up and brakes."""
+        per_m_s = (COUPLED_SMOOTH if self.vehicle.smooths else COUPLED) / self.vehicle.accel_m_s2
+        least_s, most_s = self._held_s
+        joints_s = self.summed((fast_m_s - slow_m_s) * per_m_s)
+        joints_s = np.append(joints_s[1:], joints_s[-1:])  # the joint to the next stretch
+        return joints_s + np.cumsum((most_s - least_s + 2.0 * self._uneven_s) * self._rounds)
+
+    def between(self, slow_m_s: Floats, fast_m_s: Floats) -> TimeWindow:
+        """The window where each part is flown at most at a speed between two."""
+        least_s, most_s = self._held_s
+        latest = earliest = self.times.seconds(slow_m_s)
+        differ = np.zeros(len(self.stretches), dtype=np.bool_)
+        np.logical_or.at(differ, self._parts.stretch, slow_m_s != fast_m_s)
+        if differ.any():
+            # A leg ends in the turn to the next one.
+            uneven_s = np.where(
+                differ | np.append(differ[1:], False) | np.append(False, differ[:-1]), self._uneven_s, 0.0
+            )
+            latest, earliest = latest + uneven_s, np.maximum(self.times.seconds(fast_m_s) - uneven_s, 0.0)
+        return TimeWindow(np.cumsum((earliest + least_s) * self._rounds), np.cumsum((latest + most_s) * self._rounds))
+
+    @cached_property
+    def _rounds(self) -> Floats:
+        return np.array([float(s.times) for s in self.stretches])
+
+    @cached_property
+    def _uneven_s(self) -> Floats:
+        """(N,) by how much a stretch may be later if it is flown faster."""
+        count = len(self.stretches)
+        uneven = np.zeros(count)
+        if self.vehicle.keeps_airspeed or not (self.vehicle.lays_curves or self.vehicle.smooths):
+            return uneven
+        run_m = np.bincount(self._parts.stretch, weights=self._run_m, minlength=count)
+        seqs = [s.seq for s in self.stretches]
+        ends = [*(i for i, (a, b) in enumerate(pairwise(seqs)) if a != b), count - 1]
+        first = 0
+        for last in ends:  # chords of one item are one leg
+            length_m = float(run_m[first : last + 1].sum())
+            uneven[last] = 0.0 if length_m <= _NO_RUN_M else UNEVEN_S if length_m < SHORT_M else EVEN_S
+            first = last + 1
+        return uneven
+
+    def _gust_s(self, along: WindsAlong, latest_s: Floats) -> tuple[Floats, Floats]:
+        """(N,) by how much gusts make the end of each stretch later, and earlier.
+
+        Turbulence of the length L drifts past at the airspeed V: its displacement in T seconds has the variance
+        2·σ²·τ²·(T/τ - 1 + exp(-T/τ)) with τ = L/V. Besides, gusts across the track cost a fixed wing the mean speed
+        σ²/2·√(V² - n²) at most, and a multicopter, which no gust makes faster than commanded, σ/√(2π) where a gust may
+        slow it down; where none may, it is not displaced.
+        """
+        add_m_s, nothing = self.wind.gusts_add_m_s, np.zeros(len(self.stretches))
+        if not add_m_s or not len(self._run_m):
+            return nothing, nothing
+        cells, sigma = cover(self.wind), add_m_s / GUST_SIGMAS
+        slow = along.speeds_m_s(cells)[0].min(axis=0)
+        weak = along.speeds_m_s(cells, add_m_s)[0].min(axis=0) < self._ability.most_m_s
+        per_m_s, air = nothing.copy(), float(self._ability.least_air_m_s.min())
+        np.maximum.at(per_m_s, self._parts.stretch, np.where(weak, 1.0 / slow, 0.0))
+        lost_m_s = sigma / math.sqrt(2.0 * math.pi)
+        if self.vehicle.keeps_airspeed:
+            lost_m_s = 0.5 * sigma**2 / math.sqrt(max(air**2 - self.wind.most_m_s**2, sigma**2))
+        tau = gust_length_m(float(self._agl_m[:, 1].max())) / air
+        drifts = latest_s / tau
+        moved_m = add_m_s * tau * np.sqrt(2.0 * np.maximum(drifts - 1.0 + np.exp(-drifts), 0.0))
+        early_s = np.maximum.accumulate(per_m_s) * moved_m
+        return early_s + np.cumsum(np.diff(latest_s, prepend=0.0) * per_m_s * lost_m_s), early_s
+
+    def _cannot(self, wind: DeclaredWind) -> tuple[int, Floats] | None:
+        """A stretch that cannot be flown in a wind of the set, and that wind (2,); None if there is none."""
+        cells, gust_m_s = cover(wind), wind.gusts_add_m_s
+        if len(self._run_m):
+            along = self._along(wind, self._any_hour)
+            slow, _ = along.speeds_m_s(cells, gust_m_s)
+            slow = np.where(self._run_m > _NO_RUN_M, np.nan_to_num(slow, nan=-math.inf), math.inf)
+            cell, part = np.unravel_index(int(np.argmin(slow)), slow.shape)
+            if not slow[cell, part] >= ADVANCES_M_S:
+                return int(self._parts.stretch[part]), along.wind_of(int(part), cells[cell])
+        places = self._places(wind)
+        spare = np.where(self._stays, places.ability.least_air_m_s - places.strongest_m_s(cells) - gust_m_s, math.inf)
+        worst = int(np.argmin(spare))
+        return None if spare[worst] > 0.0 else (worst, places.wind_of(worst, cells[0]))
+
+    @cached_property
+    def _stays(self) -> Bools:
+        """(N,) whether it keeps a place, or a circle, on a stretch or at its end."""
+        wing = self.vehicle.keeps_airspeed
+        return np.array([(s.hold_s > 0.0 and (not wing or s.reach_m > 0.0)) or (s.column and not wing)
+                         for s in self.stretches])  # fmt: skip
+
+    def _places(self, wind: DeclaredWind) -> WindsAlong:
+        """The winds over the stretches' places, at any hour of the flight."""
+        amsl_m = np.sort([(s.start[2], s.end[2]) for s in self.stretches], axis=1)
+        count = len(amsl_m)
+        speed = np.array([s.speed_m_s for s in self.stretches])
+        least, most = air_m_s(self.vehicle, speed, np.zeros(count), amsl_m[:, 1])
+        east = np.tile([1.0, 0.0], (count, 1))
+        ability = Ability(east, np.zeros(count), least, most, np.full(count, math.inf))
+        hours_s = np.tile([self._departs_s[0], math.inf], (count, 1))
+        return _probes(wind, ability, amsl_m, self._agl_m, hours_s)
+
+    def _along(self, wind: DeclaredWind, hours_s: Floats) -> WindsAlong:
+        """The winds of a set along the parts, within hours (P, 2)."""
+        parts = self._parts
+        amsl_m = np.sort(np.column_stack([parts.start[:, 2], parts.end[:, 2]]), axis=1)
+        return _probes(wind, self._ability, amsl_m, self._agl_m[parts.stretch], hours_s)
+
+
+class WaysHome:
+    """What straight ways home take at most, in any wind of a set, between two altitudes ``amsl_m``.
+
+    The metres through the air and the seconds of a way are convex in the way over ground, with any wind. They are known
+    in some directions; between two of these they are no more than in proportion, which is convex too.
+    """
+
+    def __init__(self, vehicle: Vehicle, wind: FlightWind, amsl_m: tuple[float, float]) -> None:
+        self._vehicle, self._wind, self._amsl_m = vehicle, wind, amsl_m
+        self._costs: dict[float, tuple[list[float], list[float]]] = {}
+        self.wind_m_s = float(self._winds(1.0).strongest_m_s(cover(wind.declared)).max())
+        """The highest speed of the wind."""
+
+    def longer_m(self, speed_m_s: float, way_m: tuple[float, float], past_m: float) -> tuple[float, float]:
+        """The metres through the air of a way (east, north), and as many as take as long in still air, at a commanded
+        speed; with ``past_m`` more metres in any direction. Neither is less than the way."""
+        air, seconds = self._rays(speed_m_s)
+        long_m = math.hypot(*way_m)
+        at = math.atan2(way_m[1], way_m[0]) % (2.0 * math.pi) / _RAY_RAD
+        first = min(int(at), _RAYS - 1)
+        after, scale = (first + 1) % _RAYS, long_m / math.sin(_RAY_RAD)
+        a, b = scale * math.sin((first + 1 - at) * _RAY_RAD), scale * math.sin((at - first) * _RAY_RAD)
+        air_m, took_s = (
+            math.fsum(m * cost for m, cost in ((a, c[first]), (b, c[after]), (past_m, max(c))) if m > 0.0)
+            for c in (air, seconds)
+        )
+        return air_m, took_s * speed_m_s
+
+    def worst(self, speed_m_s: float) -> tuple[float, float]:
+        """Metres through the air and seconds of a metre in the worst direction."""
+        air, seconds = self._rays(speed_m_s)
+        return max(air), max(seconds)
+
+    def _rays(self, speed_m_s: float) -> tuple[list[float], list[float]]:
+        """Metres through the air and seconds for a metre over ground in each direction."""
+        if speed_m_s not in self._costs:
+            found = self._winds(speed_m_s).costs(cover(self._wind.declared))
+            air, seconds = (np.where(cost > 0.0, cost, math.inf).max(axis=0) for cost in found)
+            rays = np.maximum(air, 1.0).tolist(), np.maximum(seconds, 1.0 / speed_m_s).tolist()
+            self._costs[speed_m_s] = rays
+        return self._costs[speed_m_s]
+
+    def _winds(self, speed_m_s: float) -> WindsAlong:
+        angle = _RAY_RAD * np.arange(_RAYS)
+        none, speed, one = np.zeros(_RAYS), np.full(_RAYS, speed_m_s), np.ones((_RAYS, 1))
+        least, most = air_m_s(self._vehicle, speed, none, np.full(_RAYS, self._amsl_m[0]))
+        bound = np.full(_RAYS, math.inf) if self._vehicle.keeps_airspeed else speed
+        ability = Ability(np.column_stack([np.cos(angle), np.sin(angle)]), none, least, most, bound)
+        departs_s = self._wind.departs_s[0]
+        return _probes(
+            self._wind.declared, ability, one * self._amsl_m, one * [0.0, math.inf], one * [departs_s, math.inf]
+        )  # fmt: skip
+
+
+def _probes(wind: DeclaredWind, ability: Ability, amsl_m: Floats, agl_m: Floats, hours_s: Floats) -> WindsAlong:
+    """The winds of a set, within heights and hours (P, 2): probes at the ends of these and at the set's own between."""
+    if len(wind.heights_m) == 1 and len(wind.times_s) == 1:
+        zero = np.zeros(len(amsl_m))
+        return WindsAlong(wind, ability, np.arange(len(amsl_m)), zero, zero, zero)
+    spans_m, rows = amsl_m if wind.heights == "amsl" else agl_m, []
+    for i, (span_m, span_s) in enumerate(zip(spans_m.tolist(), hours_s.tolist(), strict=True)):
+        heights, times = _between(span_m, wind.heights_m), _between(span_s, wind.times_s)
+        rows += [(i, h, t) for h in heights for t in times]
+    part, height, at = np.array(rows).reshape(-1, 3).T
+    return WindsAlong(wind, ability, part.astype(np.intp), height, height, at)
+
+
+def _between(span: Sequence[float], nodes: Floats) -> list[float]:
+    """The ends of a span, within ``nodes``, and the nodes inside."""
+    low, high = (min(max(x, float(nodes[0])), float(nodes[-1])) for x in span)
+    inside = nodes[(nodes > low) & (nodes < high)].tolist()
+    return [low, *inside, *([high] if high > low else [])]
+
+
+def _ability(vehicle: Vehicle, parts: Parts) -> tuple[Ability, Floats]:
+    """What the vehicle can do on the parts, and their lengths over ground (P,)."""
+    d = parts.end - parts.start
+    run = np.hypot(d[:, 0], d[:, 1])
+    moves = run > _NO_RUN_M
+    level = np.where(moves, run, 1.0)
+    course = np.where(moves[:, None], d[:, :2] / level[:, None], 0.0)
+    slope = np.where(moves, d[:, 2] / level, 0.0)
+    least, most = air_m_s(vehicle, parts.speed_m_s, slope, 0.5 * (parts.start[:, 2] + parts.end[:, 2]))
+    wing = vehicle.keeps_airspeed
+    bound = np.full(len(run), math.inf) if wing else parts.speed_m_s
+    return Ability(course, slope if wing else np.zeros_like(slope), least, most, bound), run

@@ -1,0 +1,141 @@
+"""The earliest and the latest time at each point of a flight, over all winds of a set.
+
+One wind of the set blows during the whole flight, so the shares are searched (branch and bound): the times of a cell of
+shares are bounded by the speeds that its winds allow each part (`_within`). Cells that may hold an extreme are halved
+until both ends of all times are known within `PART` of the time, `OF_WIDTH` of the window, or `WITHIN_S`, or until
+`MOST_WIND_CELLS` are looked at; what is not known then counts outward.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Protocol
+
+import numpy as np
+
+from gcsplan.arrays import Floats
+from gcsplan.wind.ability import ADVANCES_M_S, WindsAlong
+from gcsplan.wind.declared import DeclaredWind
+
+__all__ = ["FlightClock", "TimeWindow", "cover", "window"]
+
+PART, OF_WIDTH, WITHIN_S = 1e-3, 0.03, 0.05
+MOST_WIND_CELLS = 128
+_TURNS = 8
+_FINE = 128
+
+_ONE = np.zeros((1, 2, 2))
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class TimeWindow:
+    """The earliest and the latest time at each of N points, seconds after the departure."""
+
+    earliest_s: Floats
+    latest_s: Floats
+
+
+class FlightClock(Protocol):
+    """The times of a flight at N points, for speeds over ground (P,) of its parts."""
+
+    @property
+    def run_m(self) -> Floats:
+        """(P,) the parts' lengths over ground."""
+
+    def between(self, slow_m_s: Floats, fast_m_s: Floats) -> TimeWindow:
+        """The window where each part is flown at most at a speed between two."""
+
+    def summed(self, seconds: Floats) -> Floats:
+        """(..., N) the sums of seconds of parts (..., P) up to each point, with all rounds."""
+
+    def loose_s(self, slow_m_s: Floats, fast_m_s: Floats) -> Floats:
+        """(N,) by how much the seconds beyond the parts' lengths over speeds may at most fall, where speeds rise from
+        the first to the second."""
+
+
+def cover(wind: DeclaredWind) -> Floats:
+    """(K, 2, 2) cells of all shares of a set: all speeds together, the directions in parts."""
+    if wind.single:
+        return _ONE
+    ends = np.linspace(0.0, 1.0, _FINE + 1)
+    direction = np.column_stack([ends[:-1], ends[1:]])
+    return np.stack([np.broadcast_to([0.0, 1.0], direction.shape), direction], axis=1)
+
+
+def window(winds: WindsAlong, clock: FlightClock) -> TimeWindow:
+    """The window at each point that ``clock`` tells of, by the speeds that ``winds`` allow."""
+    if winds.wind.single or winds.wind.varying:
+        slow, fast = winds.speeds_m_s(cover(winds.wind))
+        return clock.between(np.fmax(slow, ADVANCES_M_S).min(axis=0), fast.max(axis=0))
+    return _searched(winds, clock)
+
+
+def _within(winds: WindsAlong, clock: FlightClock, cells: Floats) -> list[TimeWindow]:
+    """The bounds of the times with one wind of each cell during the whole flight.
+
+    They lie between the times at the parts' highest and lowest speeds. Nearer: the sum of lengths over speeds is
+    convex in the wind, so no more than at a corner, and no less than its tangent; what a flight takes beyond that sum
+    hardly falls where speeds rise.
+    """
+    found, most = winds.bounds(cells), winds.ability.most_m_s
+    corner = np.fmax(found.corner_m_s, ADVANCES_M_S)  # whoever flies at all is so fast
+    slow = corner.min(axis=1)
+    fast = np.minimum(found.top_m_s + found.beyond_m_s.max(axis=1), most)
+    top = np.minimum(found.top_m_s, most)
+    late = clock.summed(clock.run_m / corner).max(axis=1)
+    falls = np.where(found.top_m_s < most, clock.run_m / top**2, 0.0)[:, None] * found.beyond_m_s
+    early = clock.summed(clock.run_m / top) - clock.summed(falls).max(axis=1)
+    at_fast, at_slow = clock.summed(clock.run_m / fast), clock.summed(clock.run_m / slow)
+    windows = []
+    for k in range(len(cells)):
+        rough, loose_s = clock.between(slow[k], fast[k]), clock.loose_s(slow[k], fast[k])
+        earliest_s = rough.latest_s - at_slow[k] + early[k] - loose_s
+        latest_s = rough.earliest_s - at_fast[k] + late[k] + loose_s
+        windows.append(TimeWindow(np.maximum(rough.earliest_s, earliest_s), np.minimum(rough.latest_s, latest_s)))
+    return windows
+
+
+def _searched(winds: WindsAlong, clock: FlightClock) -> TimeWindow:
+    """The window of one unknown wind."""
+    ends, looked = np.linspace(0.0, 1.0, _TURNS + 1), 0
+    cells = np.array([[[0.0, 1.0], [a, b]] for a, b in pairwise(ends.tolist())])
+    kept: list[tuple[Floats, TimeWindow]] = []
+    earliest_s, latest_s = np.array(np.inf), np.array(-np.inf)
+    while True:
+        kept += list(zip(cells, _within(winds, clock, cells), strict=True))
+        for speeds in zip(*winds.speeds_m_s(np.repeat(_likely(cells)[:, :, None], 2, axis=2)), strict=True):
+            at = clock.between(*speeds)
+            earliest_s, latest_s = np.fmin(earliest_s, at.earliest_s), np.fmax(latest_s, at.latest_s)
+        looked += len(cells)
+        excess = np.array([_excess(bound, earliest_s, latest_s) for _, bound in kept])
+        open_ = np.flatnonzero(excess > 0.0)
+        if not len(open_) or looked >= MOST_WIND_CELLS:
+            break
+        worst = open_[np.argsort(-excess[open_], kind="stable")][: max(_TURNS, len(open_) // 4)].tolist()
+        cells = np.concatenate([_halves(kept[i][0], winds) for i in worst])
+        kept = [one for i, one in enumerate(kept) if i not in set(worst)]
+    bounds = [bound for _, bound in kept]
+    return TimeWindow(np.min([b.earliest_s for b in bounds], axis=0), np.max([b.latest_s for b in bounds], axis=0))
+
+
+def _likely(cells: Floats) -> Floats:
+    """(K, 2) a share of each cell to try: its fastest wind, for extremes are mostly there, in its middle direction."""
+    return np.column_stack([cells[:, 0, 1], cells[:, 1].mean(axis=1)])
+
+
+def _excess(bound: TimeWindow, earliest_s: Floats, latest_s: Floats) -> float:
+    """By how much more than is allowed a cell's bounds exceed times that some winds give."""
+    allowed = np.maximum(np.maximum(PART * latest_s, OF_WIDTH * (latest_s - earliest_s)), WITHIN_S)
+    return float(np.maximum(bound.latest_s - latest_s - allowed, earliest_s - bound.earliest_s - allowed).max())
+
+
+def _halves(cell: Floats, winds: WindsAlong) -> Floats:
+    """A cell cut in two, across the range in which its winds differ more."""
+    wind = winds.wind
+    turn_m_s = np.radians(np.diff(wind.from_deg)[..., 0]) * wind.speed_m_s[..., 1]
+    spans_m_s = np.array([np.diff(wind.speed_m_s).max(), turn_m_s.max()])
+    axis = int(np.argmax(spans_m_s * (cell[:, 1] - cell[:, 0])))
+    halves = np.stack([cell, cell])
+    halves[0, axis, 1] = halves[1, axis, 0] = cell[axis].mean()
+    return halves

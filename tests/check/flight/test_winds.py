@@ -1,0 +1,180 @@
+"""Flights in declared winds: refusals, windows and energies, against flights in single winds of the set."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gcsplan.check.battery import battery_home
+from gcsplan.check.flight.winds import (
+    COUPLED,
+    COUPLED_SMOOTH,
+    EVEN_S,
+    SHORT_M,
+    UNEVEN_S,
+    WaysHome,
+    gust_length_m,
+)
+from gcsplan.check.judge import judge
+from gcsplan.check.verdict import Verdict
+from gcsplan.fleet.motion.timing import legs
+from gcsplan.vehicle import Autopilot, Energy, Vehicle
+from gcsplan.wind.declared import DeclaredWind, FlightWind
+from gcsplan.wind.window import TimeWindow
+from tests.check.test_judge import mission_over
+from tests.support.worlds import vehicle, world
+
+THERE = [[0.0, 0, 366], [2500, -900, 366], [4000, 1500, 366]]
+
+
+def blows(speed: tuple[float, float], from_deg: tuple[float, float], **more: object) -> FlightWind:
+    sets = (np.array(pair, dtype=float).reshape(1, -1, 2) for pair in (speed, from_deg))
+    return FlightWind(DeclaredWind(*sets, **more))  # type: ignore[arg-type]
+
+
+def leaning(autopilot: Autopilot = Autopilot.ARDUCOPTER) -> Vehicle:
+    lean = 40.0 if autopilot is Autopilot.ARDUCOPTER else None
+    return replace(vehicle(autopilot), speed_max_m_s=12.0, lean_angle_deg=lean, leg_jerk_m_s3=4.0)
+
+
+def flown(wind: FlightWind | None, craft: Vehicle | None = None, points: list[list[float]] = THERE) -> Verdict:
+    mission, craft = mission_over(world(), points, craft or leaning())
+    return judge(mission, craft, world(), wind=wind)
+
+
+def window_of(verdict: Verdict) -> tuple[float, float]:
+    window = verdict.arrive_window_s()
+    assert window is not None
+    return window
+
+
+def ends_of(verdict: Verdict) -> TimeWindow:
+    assert verdict.in_wind is not None
+    assert verdict.in_wind.window is not None
+    return verdict.in_wind.window
+
+
+def test_still_air_has_no_window_and_every_figure_as_before() -> None:
+    assert flown(None).arrive_window_s() is None
+    assert flown(blows((0, 0), (0, 0))).legs == flown(None).legs
+
+
+def test_a_constant_wind_gives_one_time_and_only_what_the_lean_allows() -> None:
+    still, blown = flown(None), flown(blows((6, 6), (90, 90)))
+    earliest_s, latest_s = window_of(blown)
+    assert latest_s == earliest_s > still.arrive_s + 60.0
+    assert blown.arrive_s == still.arrive_s
+    assert window_of(flown(blows((6, 6), (270, 270))))[1] == pytest.approx(still.arrive_s, abs=1e-6)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("autopilot", [Autopilot.ARDUCOPTER, Autopilot.PX4])
+def test_a_set_holds_every_wind_of_it_in_window_and_energy(autopilot: Autopilot) -> None:
+    craft = replace(leaning(autopilot), energy=Energy(base_w=200.0))
+    whole = flown(blows((0, 7), (0, 360)), craft)
+    bounds = ends_of(whole)
+    for speed, from_deg in np.random.default_rng(3).uniform([0, 0], [7, 360], (12, 2)):
+        one = flown(blows((speed, speed), (from_deg, from_deg)), craft)
+        times = ends_of(one)
+        assert (times.earliest_s >= bounds.earliest_s).all()
+        assert (times.latest_s <= bounds.latest_s).all()
+        assert one.energy_j <= whole.energy_j + 1e-6
+
+
+def test_a_wind_too_strong_is_refused_with_one_that_was_tried() -> None:
+    verdict = flown(blows((0, 20), (0, 360)))
+    [finding] = verdict.findings
+    assert (finding.kind, verdict.safe, verdict.arrive_window_s()) == ("wind", False, None)
+    assert flown(blows((0, finding.limit), (0, 360), varying=True)).safe is True
+    assert flown(blows((0, finding.limit + 0.2), (0, 360), varying=True)).safe is False
+
+
+def test_gusts_count_in_what_it_must_be_able_to_do_and_have_their_share() -> None:
+    calm, gusty = window_of(flown(blows((5, 5), (90, 90)))), window_of(flown(blows((5, 5), (90, 90), gust_m_s=8.0)))
+    assert gusty[1] > calm[1]
+    assert flown(blows((8, 8), (90, 90), gust_m_s=14.0)).safe is False
+    assert gust_length_m(30.0) < gust_length_m(200.0) < gust_length_m(400.0) == gust_length_m(900.0)
+
+
+@pytest.mark.slow
+def test_a_varying_wind_has_a_wider_window_than_one_that_is_constant() -> None:
+    one, any_ = (window_of(flown(blows((0, 7), (0, 360), varying=v))) for v in (False, True))
+    assert any_[0] <= one[0] <= one[1] < any_[1]
+
+
+def test_a_profile_over_height_counts_at_the_height_that_is_flown() -> None:
+    levels = {"heights_m": np.array([300.0, 366.0, 500.0]), "heights": "amsl"}
+    aloft = flown(blows(((0, 0), (6, 6), (30, 30)), ((90, 90),) * 3, **levels))  # type: ignore[arg-type]
+    assert window_of(aloft)[1] == pytest.approx(window_of(flown(blows((6, 6), (90, 90))))[1], rel=1e-4)
+
+
+def test_a_forecast_counts_in_the_hours_of_the_flight() -> None:
+    hours = {"times_s": np.array([0.0, 3600.0, 7200.0])}
+    speed, from_deg = np.array([[[6.0, 6.0]], [[6.0, 6.0]], [[19.0, 19.0]]]), np.full((3, 1, 2), 90.0)
+    forecast = FlightWind(DeclaredWind(speed, from_deg, **hours), (0.0, 0.0))  # type: ignore[arg-type]
+    found = window_of(flown(replace(forecast, declared=replace(forecast.declared, speed_m_s=np.minimum(speed, 8.0)))))
+    assert found[1] == pytest.approx(window_of(flown(blows((6, 6), (90, 90))))[1], rel=1e-6)
+
+
+def test_the_battery_and_the_way_home_count_the_worst_wind() -> None:
+    craft = replace(leaning(), energy=Energy(battery_j=2e6, hover_w=100.0))
+    home = (36.6, -84.3, 300.0)
+
+    def most_j(wind: FlightWind | None) -> float:
+        found = battery_home(flown(wind, craft), craft, home, 330.0)
+        assert found is not None
+        return found.most_j
+
+    any_wind = blows((0, 6), (0, 360), varying=True)
+    still, east, west = (most_j(w) for w in (None, blows((6, 6), (90, 90)), blows((6, 6), (270, 270))))
+    any_ = most_j(any_wind)
+    assert any_ >= max(east, west) > still
+    tight = replace(craft, energy=replace(craft.energy, battery_j=(flown(None, craft).energy_j + 1.0) / 0.8))
+    assert flown(None, tight).safe is True
+    assert [f.kind for f in flown(blows((6, 6), (90, 90)), tight).findings] == ["battery"]
+
+
+def test_a_way_home_in_any_direction_costs_no_less_than_the_wind_triangle() -> None:
+    craft = leaning()
+    ways = WaysHome(craft, blows((6, 6), (90, 90)), (300.0, 300.0))
+    for course in np.radians(np.linspace(3.0, 360.0, 23)):
+        unit = np.array([math.sin(course), math.cos(course)])
+        air_m, slow_m = ways.longer_m(10.0, (1000.0 * unit[0], 1000.0 * unit[1]), 0.0)
+        g = 1000.0 * 10.0 / slow_m
+        through = math.hypot(*(g * unit - np.array([-6.0, 0.0])))
+        assert 1000.0 * max(through / g, 1.0) <= air_m + 1e-6
+        assert air_m <= 1000.0 * max(through / g, 1.0) * 1.01
+
+
+CRAFT: dict[str, dict[str, Any]] = {
+    "rounded": {}, "curved": {"leg_jerk_m_s3": 1.0}, "sharp": {"corner_accel_m_s2": math.inf, "accel_m_s2": math.inf},
+    "smoothed": {"autopilot": Autopilot.PX4, "leg_jerk_m_s3": 4.0, "accel_m_s2": 3.0},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", CRAFT)
+@given(st.integers(1, 7), st.integers(0, 2**32 - 1))
+def test_slower_legs_are_never_done_earlier_but_for_what_is_uneven(kind: str, count: int, seed: int) -> None:
+    """What the bounds of times in a wind rest on (`gcsplan.wind.window`)."""
+    drawn = np.random.default_rng(seed)
+    sizes = 10 ** drawn.uniform(0.5, 3.3, (count, 1))
+    steps = np.column_stack([drawn.normal(0, sizes, (count, 2)), drawn.normal(0, 20, count)])
+    points = np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])
+    fast = drawn.uniform(2, 20, count)
+    slow = fast * np.where(drawn.random(count) < 0.5, 1.0, drawn.uniform(0.3, 1.0, count))
+    craft, run_m = replace(vehicle(), **CRAFT[kind]), np.hypot(*np.diff(points, axis=0)[:, :2].T)
+    early, late = (
+        np.cumsum(legs(points, craft, np.arange(count), ground_m_s=speeds).shares_s(1.0, count))
+        for speeds in (fast, slow)
+    )  # fmt: skip
+    uneven_s = np.zeros(count) if kind in ("rounded", "sharp") else np.where(run_m < SHORT_M, UNEVEN_S, EVEN_S)
+    assert (early - late <= np.cumsum(uneven_s) + 1e-6).all()
+    beyond = (late - np.cumsum(run_m / slow)) - (early - np.cumsum(run_m / fast))
+    joints = np.cumsum((fast - slow) * (COUPLED_SMOOTH if kind == "smoothed" else COUPLED) / craft.accel_m_s2)
+    assert (beyond <= np.append(joints[1:], joints[-1:]) + 2.0 * np.cumsum(uneven_s) + 1e-6).all()
