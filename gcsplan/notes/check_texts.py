@@ -92,6 +92,10 @@ CHECK_TEXTS = {
         "in a cross wind it drifts aside, by up to {drift_m:distance.0} for each m/s, as its nose holds the heading: "
         "launch into the wind, or let {key:track_error_m} hold that"
     ),
+    "climb_out_blown": (
+        "winds and gusts of up to {wind_m_s:speed.1} are judged in its climb-out: less steep over ground with one "
+        "behind, and up to {drift_m:distance.0 up} aside, as its nose holds the heading"
+    ),
     "climb_out_circles": ("the take-off goes on in circles, judged as {reach_m:distance.0} wide all the way up"),
     "turns_early": (
         "it turns towards the next item as soon as it is high enough, so all straight ways there from the climb-out "
