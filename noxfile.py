@@ -36,6 +36,7 @@ CAMPAIGNS = (
     "hours",
     "stale",
     "worlds",
+    "winds",
 )
 CAMPAIGN_S = 30
 CAMPAIGNS_AT_ONCE = 3

@@ -168,7 +168,10 @@ class Vehicle:
     a sharp corner at full speed. A climb or descent rate of ``inf`` means that the cruise speed is the speed in space,
     whatever the slope: the ideal vehicle of the papers. ``lean_angle_deg`` is an ArduCopter's largest lean angle, and
     ``vel_max_m_s`` a PX4's MPC_XY_VEL_MAX: they have bounded ``speed_max_m_s`` already; None: they bound nothing.
-    ``climb_out``: a fixed wing's, if it is known. ``return_m_s``, ``return_wait_s``: the speed of the autopilot's own
+    ``climb_out``: a fixed wing's, if it is known. ``blows_m_s``: the most that the declared winds and gusts blow along
+    each of so many courses, evenly all around from east to north; of a fixed wing, whose `limits` then hold over ground
+    in every one of these winds; empty: still air. ``climbs_deg``: its steepest climb through the air;
+    None: `limits` has it. ``return_m_s``, ``return_wait_s``: the speed of the autopilot's own
     return and its wait over home, if they are not the defaults.
     """
 
@@ -193,6 +196,43 @@ class Vehicle:
     climb_out: ClimbOut | None = None
     return_m_s: float | None = None
     return_wait_s: float | None = None
+    blows_m_s: tuple[float, ...] = ()
+    climbs_deg: float | None = None
+
+    @property
+    def wind_m_s(self) -> float:
+        """The strongest of the winds and gusts in ``blows_m_s``; 0 in still air."""
+        courses = len(self.blows_m_s)
+        return max(self.blows_m_s) / math.cos(math.pi / courses) if courses else 0.0
+
+    def tail_m_s(self, course_rad: float) -> float:
+        """The most that a wind pushes a fixed wing along a course, radians from east to north; 0 if none does."""
+        return max(0.0, self.blows_along_m_s(course_rad))
+
+    def blows_along_m_s(self, course_rad: float) -> float:
+        """As `tail_m_s`, below 0 if every wind blows against the course."""
+        courses = len(self.blows_m_s)
+        if not courses:
+            return 0.0
+        step = 2.0 * math.pi / courses
+        k, past = divmod(course_rad % (2.0 * math.pi), step)
+        before, after = (self.blows_m_s[(int(k) + i) % courses] for i in (0, 1))
+        # A course between two others is a sum of both, and a wind blows along it by at most the same sum.
+        return (math.sin(step - past) * before + math.sin(past) * after) / math.sin(step)
+
+    def aside_m_s(self, course_rad: float) -> float:
+        """The most that a wind blows a fixed wing to either side of a course."""
+        return max(self.tail_m_s(course_rad + side) for side in (0.5 * math.pi, -0.5 * math.pi))
+
+    @property
+    def tail_ratio(self) -> float:
+        """A slope over ground with the strongest wind behind, per the slope through the air, at the slowest speed."""
+        return self.speed_min_m_s / (self.speed_min_m_s + self.wind_m_s)
+
+    @property
+    def steepest_in_air_deg(self) -> float:
+        """The steepest climb through the air."""
+        return self.limits.max_climb_deg if self.climbs_deg is None else self.climbs_deg
 
     def fastest_over_ground_m_s(self, speed_m_s: float, amsl_m: float) -> float:
         """No faster than this over ground in still air, with a commanded speed, near home and up to an altitude."""

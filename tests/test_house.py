@@ -357,8 +357,8 @@ def test_a_function_fits_on_a_screen() -> None:
 MOST_IN_A_FOLDER = 15
 
 MOST = {
-    "modules": 460,
-    "statements": 65_279,
+    "modules": 483,
+    "statements": 69_204,
     "type names with two meanings": 0,
     "constants with two values": 1,
     "folders with more than 15 modules": 0,

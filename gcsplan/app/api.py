@@ -257,7 +257,7 @@ def upload(
 def rehearse(
     planned: Plan,
     *,
-    wind_m_s: float = 0.0,
+    wind_m_s: float | None = None,
     from_deg: float | None = None,
     gusts_m_s: float = 0.0,
     noise_m: float = 0.0,
@@ -270,13 +270,14 @@ def rehearse(
     """Upload a plan to simulated vehicles, fly what they store in simulated time, and judge that; all on this machine.
 
     Wind, gusts and position noise (`gcsplan.sim.flight.wind.Weather`) are drawn from ``seed``, anew for each of
-    ``runs``. ``progress(done, runs)`` is called from time to time. ``jobs`` processes or the workers of ``cluster``
-    share the runs, as in `plan`, with the same result. The result's ``safe`` is True if the arrivals were in order, and
-    the separation and every limit were kept on the flown tracks; ``error()`` states what was not kept. Raises what
+    ``runs``. With ``wind_m_s`` None and no gusts each run draws one of the winds that the mission declares, with gusts
+    of its own; a mission that declares none is flown in still air. ``progress(done, runs)`` is called from time to
+    time. ``jobs`` processes or the workers of ``cluster`` share the runs, as in `plan`, with the same result. The
+    result's ``safe`` is True if the arrivals were in order, and the separation and every limit were kept on the flown
+    tracks; ``error()`` states what was not kept. Raises what
     an upload raises, CheckFailed as `upload` does for a return that is required, and InputError for invalid weather.
     """
     from gcsplan.app import rehearse as rehearsing
-    from gcsplan.sim.flight.wind import Weather
 
     require(
         "rehearse", planned=planned, wind_m_s=wind_m_s, from_deg=from_deg, gusts_m_s=gusts_m_s, noise_m=noise_m,
@@ -285,8 +286,8 @@ def rehearse(
     returns.judged(planned, home=False)
     if seed < 0:
         raise wrong_argument("rehearse()", "seed", seed, "a whole number, 0 or more")
-    from_deg = None if from_deg is None else float(from_deg)
-    weather = Weather(float(wind_m_s), from_deg, float(gusts_m_s), float(noise_m))
+    wind_m_s, from_deg = (None if value is None else float(value) for value in (wind_m_s, from_deg))
+    weather = rehearsing.weather_of(planned.source, wind_m_s, from_deg, float(gusts_m_s), float(noise_m))
     return rehearsing.rehearse(
         planned, weather=weather, runs=runs, seed=seed, progress=progress, jobs=jobs, cluster=cluster
     )

@@ -31,6 +31,7 @@ from gcsplan.mavlink.mission.return_parameters import return_on_board_m
 from gcsplan.sim.outcome import Rehearsal, RehearsalPart, Tally, Terms
 
 if TYPE_CHECKING:
+    from gcsplan.mission_file import MissionFile
     from gcsplan.sim.flight.wind import Weather
     from gcsplan.sim.rehearsal import Flights, RunBlock
 
@@ -44,6 +45,7 @@ __all__ = [
     "rehearse_in_sitl",
     "seats_of",
     "terms_of",
+    "weather_of",
 ]
 
 
@@ -63,6 +65,7 @@ def _part(planned: Plan, v: VehiclePlan) -> RehearsalPart:
         rtl_rel_home_m=request.rtl_rel_home_m,
         airborne=leaves and request.start_amsl_m is not None,
         leaves=leaves,
+        window_s=v.verdict.arrive_window_s(slot),
     )  # fmt: skip
 
 
@@ -74,6 +77,18 @@ def terms_of(planned: Plan) -> Terms:
     order = planned.fleet.order if planned.fleet is not None and arrival.mode == "sequence" else ()
     pad_clear_s = math.inf if arrival.pad_clear_s is None else arrival.pad_clear_s
     return Terms(order, arrival.separation_m, pad_clear_s)
+
+
+def weather_of(
+    source: MissionFile, wind_m_s: float | None, from_deg: float | None, gusts_m_s: float, noise_m: float
+) -> Weather:
+    """The given wind and gusts; without any of them, the set of winds that the mission declares. Raises InputError."""
+    from gcsplan.sim.flight.wind import Weather
+
+    if wind_m_s is None and from_deg is None and not gusts_m_s and not source.wind.still:
+        start_s = 0.0 if source.departure is None else source.departure.timestamp()
+        return Weather(noise_m=noise_m, declared=source.wind, start_s=start_s)
+    return Weather(wind_m_s or 0.0, from_deg, gusts_m_s, noise_m)
 
 
 def rehearse(

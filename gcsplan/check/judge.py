@@ -115,11 +115,12 @@ def judge(
         flight.notes.append(Note("straight_legs_until"))
     if any(s.terrain for s in flight.stretches):
         flight.notes.append(Note("reads_terrain_on_board", spacing_m=world.post_spacing_m, error_m=terrain_error_m))
-    said = {
-        "judged_in_wind": costs is not None, "paper_energy": vehicle.energy.papers,
-        "no_ceiling": vehicle.limits.max_agl_m is None,
-    }  # fmt: skip
-    flight.notes += [Note(code) for code, holds in said.items() if holds]
+    if costs is not None:
+        flight.notes.append(Note("judged_in_wind"))
+    if vehicle.energy.papers:
+        flight.notes.append(Note("paper_energy"))
+    if vehicle.limits.max_agl_m is None:
+        flight.notes.append(Note("no_ceiling"))
     verdict = Verdict(
         mission, figures, tuple(findings), tuple(flight.not_judged), tuple(flight.notes), misses=near, zone_pass=over,
         energy_stated=vehicle.energy.stated, paper_energy=vehicle.energy.papers,

@@ -72,8 +72,10 @@ from gcsplan.mission_file.values.schema import (
 from gcsplan.mission_file.values.units import in_own_units
 from gcsplan.mission_file.vehicles import (
     check_unique,
+    in_wind,
     make_arrival,
     make_vehicle,
+    slopes_in_wind,
     unbounded_motion,
     within_lean,
     within_vel_max,
@@ -276,6 +278,11 @@ class _MissionReading:
         frame: Frame | None = None
         if places and (frame_keys is not None or not self.local):
             frame = make_frame(places, frame_keys, problems, self.where)
+        departure = self.content.departure or (None if hours is None else hours.start)
+        wind = self._wind(hours, frame, places)
+        if wind is not None:
+            terminals = [replace(t, vehicle=in_wind(t.vehicle, wind)) for t in terminals]
+            self.notes += [slopes_in_wind(t.vehicle) for t in terminals if t.vehicle and t.vehicle.blows_m_s]
         site: MissionPlane | None = None
         ground: GroundWindow | None = None
         if frame is not None and terrain is not None:
@@ -292,8 +299,6 @@ class _MissionReading:
                 areas = self._areas(inside, frame)
                 site = MissionPlane(here, frame, box, placed, areas, terminals, set(places), self.local, self.kept)
                 ground = site.load(problems)
-        departure = self.content.departure or (None if hours is None else hours.start)
-        wind = self._wind(hours, frame, places)
         if problems or frame is None or site is None or ground is None or wind is None:
             raise self._refusal(problems)
         info = ground.surface.info

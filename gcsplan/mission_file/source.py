@@ -72,7 +72,7 @@ MOST_OF_A_NAME = 300
 """Most characters of a file's name in a message, where the name may be what is wrong."""
 
 MOST_BITS = 4096
-"""Most bits of a whole number; Python makes no text of those that have very many more."""
+"""Most bits of a whole number; Python makes no text of a number of thousands more."""
 
 UNNAMED = Path("mission.yaml")
 """Path of a mission that has no file; files that the mission names are then found from the current folder."""

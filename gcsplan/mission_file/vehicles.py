@@ -10,7 +10,10 @@ from collections.abc import Collection, Sequence
 from dataclasses import fields, replace
 from typing import Any
 
+import numpy as np
+
 from gcsplan.errors import Mistake
+from gcsplan.figures import floored
 from gcsplan.fleet.motion.ardupilot import lean_needed_deg
 from gcsplan.mission_file.request import ArrivalRequest
 from gcsplan.mission_file.values.schema import ArrivalKeys, EnergyKeys, LimitKeys, VehicleKeys, nearest
@@ -28,6 +31,7 @@ from gcsplan.vehicle import (
     lean_for_deg,
     lean_words,
 )
+from gcsplan.wind.declared import DeclaredWind
 from gcsplan.world.geometry.limits import Limits
 
 ERRORS = {"horizontal_clearance_m": 30.0, "track_error_m": 3.0, "altitude_error_m": 5.0}
@@ -124,6 +128,36 @@ def make_vehicle(
         speed_min_m_s=slow, speed_max_m_s=fast, turn_radius_m=keys.turn_radius_m,
         energy=energy, link=keys.link, climb_out=climb_out,
         **(_wing_motion(keys, limits) if keys.turn_radius_m > 0.0 else _motion(keys, local=local)),
+    )  # fmt: skip
+
+
+WIND_COURSES = 72
+"""Courses, evenly all around, for which a fixed wing knows the strongest wind along them."""
+
+
+def in_wind(vehicle: Vehicle | None, wind: DeclaredWind) -> Vehicle | None:
+    """A fixed wing in the winds that its mission declares, with limits that hold over ground in each; others as given.
+
+    A wind adds to the speed over ground and not to the climb: slopes are less steep with the strongest wind behind.
+    """
+    if vehicle is None or wind.still or not vehicle.keeps_airspeed:
+        return vehicle
+    courses_rad = 2.0 * np.pi * np.arange(WIND_COURSES) / WIND_COURSES
+    limits, blows_m_s = vehicle.limits, tuple(wind.along_m_s(courses_rad).tolist())
+    blown = replace(vehicle, blows_m_s=blows_m_s, climbs_deg=limits.max_climb_deg)
+    up, down = (
+        floored(math.degrees(math.atan(slope * blown.tail_ratio)), 2)
+        for slope in (limits.max_climb_slope, limits.max_descent_slope)
+    )
+    return replace(blown, limits=replace(limits, max_climb_deg=up, max_descent_deg=down))
+
+
+def slopes_in_wind(vehicle: Vehicle) -> Note:
+    """How steep a fixed wing flies over ground in the declared winds."""
+    limits = vehicle.limits
+    return Note(
+        "slopes_in_wind", vehicle=vehicle.name, climb_deg=limits.max_climb_deg, descent_deg=limits.max_descent_deg,
+        speed_m_s=vehicle.speed_min_m_s, wind_m_s=vehicle.wind_m_s,
     )  # fmt: skip
 
 
@@ -252,7 +286,7 @@ def _climb_out(keys: VehicleKeys, limits: Limits | None, where: str, problems: l
     return ClimbOut(rate, over_ground)
 
 
-def _wing_motion(keys: VehicleKeys, limits: Limits) -> dict[str, float]:
+def _wing_motion(keys: VehicleKeys, limits: Limits) -> dict[str, Any]:
     """Rates of a fixed wing: its speed is constant, so they follow from the slope limits unless they are given."""
     fast = keys.speed_m_s[1]
     rates = {

@@ -1,6 +1,4 @@
 """Sentences on what the check finds, does not judge and notes: items, turns, findings, energy; and the way home.
-
-On the way home: from where a return is not safe and why, what to set, and which parts are not judged.
 """
 
 CHECK_TEXTS = {
@@ -91,6 +89,10 @@ CHECK_TEXTS = {
     "climb_out_drifts": (
         "in a cross wind it drifts aside, by up to {drift_m:distance.0} for each m/s, as its nose holds the heading: "
         "launch into the wind, or let {key:track_error_m} hold that"
+    ),
+    "climb_out_blown": (
+        "winds and gusts of up to {wind_m_s:speed.1} are judged in its climb-out: less steep over ground with one "
+        "behind, and up to {drift_m:distance.0 up} aside, as its nose holds the heading"
     ),
     "climb_out_circles": ("the take-off goes on in circles, judged as {reach_m:distance.0} wide all the way up"),
     "turns_early": (

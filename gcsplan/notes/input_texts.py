@@ -324,6 +324,10 @@ INPUT_TEXTS = {
     "places_of_gps": "no POS messages, so the GPS's own places were taken",
     "power_of_system_status": "no BATTERY_STATUS, so SYS_STATUS was taken",
     "lines_passed_over": "passed over {count} {count:line|lines} without numbers",
+    "slopes_in_wind": (
+        "with winds and gusts of up to {wind_m_s:speed.1} behind it, it climbs {climb_deg:g}° and descends "
+        "{descent_deg:g}° over ground at most, at its slowest speed of {speed_m_s:speed}: the path keeps to that"
+    ),
     "wind_unknown": "no log tells the wind: metres over ground are taken for those through the air",
     "wind_counted": "metres are those through the air, in a wind of {wind_m_s:speed.1} as the log tells it",
     "wind_counted_of_some": (

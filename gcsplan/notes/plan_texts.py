@@ -59,6 +59,10 @@ PLAN_TEXTS = {
         "it lands on a heading of {heading_deg:.0f}°, gliding straight for {far_m:distance.0} from {up_m:height.0} "
         "above the goal"
     ),
+    "approach_into_wind": (
+        "it lands into the declared winds{uphill: and uphill|}: they blow least from behind on headings like this one"
+    ),
+    "approach_uphill": "it lands uphill, so that it does not meet the ground before its place",
     "paper_energy_minimised": "the energy that is minimised is the paper's: a vehicle has no `energy:`",
     # -- a fleet: departures, holds and speeds of its vehicles, and the distance between them --
     # -- one vehicle's part
@@ -152,6 +156,10 @@ PLAN_TEXTS = {
     "vehicle_said": "it sent: {texts}",
     "arrived_late": "{name} arrived {late_s:seconds} late, after {took_s:seconds} instead of {told_s:seconds}",
     "down_late": "{name} was down {late_s:seconds} late, after {took_s:seconds} instead of {told_s:seconds}",
+    "arrived_outside_window": (
+        "{name} arrived {off_s:seconds.1} {late:after|before} its window, which is {earliest_s:seconds.1} to "
+        "{latest_s:seconds.1} after its departure"
+    ),
     "battery_used_up": (
         "{name} used {used_percent:.0f} % of its battery{paper: (paper's figures)|}, of which {reserve_percent:g} % "
         "must stay"

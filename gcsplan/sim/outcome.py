@@ -27,12 +27,17 @@ from gcsplan.world.world import World
 LATE_FLIGHT_PART, LATE_FLIGHT_S = 0.1, 5.0
 """A flight that is later by more than this part of its planned time, and by more than these seconds, is late."""
 
+WINDOW_PART, WINDOW_S = 0.005, 0.5
+"""Times are planned and simulated by different models of the same motion: an arrival is outside its window if it is
+off by more than this part of the flight, and by more than these seconds."""
+
 
 @dataclass(frozen=True, eq=False)
 class RehearsalPart:
     """One vehicle's part in a rehearsal: its mission with its verdict, and its planned departure and arrival.
 
     ``depart_s``, ``arrive_s``: seconds since the fleet's common start; ``arrive_s`` is None if none is planned.
+    ``window_s``: the earliest and the latest arrival over the declared winds; None: planned in still air alone.
     ``airborne``: it begins at the top of its take-off (missions from papers); ``leaves``: it is gone when it arrives.
     """
 
@@ -44,13 +49,14 @@ class RehearsalPart:
     rtl_rel_home_m: float | None = None
     airborne: bool = False
     leaves: bool = False
+    window_s: tuple[float, float] | None = None
 
     @property
     def planned_s(self) -> tuple[float, float] | None:
-        """Planned seconds from its departure to its arrival and to its end; None if the plan has no arrival."""
+        """Planned seconds from its departure to its latest arrival and its end; None if the plan has no arrival."""
         if self.arrive_s is None:
             return None
-        arrives_s = self.arrive_s - self.depart_s
+        arrives_s = (self.arrive_s if self.window_s is None else self.window_s[1]) - self.depart_s
         return arrives_s, arrives_s + max(self.verdict.time_s - self.verdict.arrive_s, 0.0)
 
 
@@ -69,6 +75,14 @@ def lateness(part: RehearsalPart, trace: Trace) -> tuple[Note, float] | None:
         )  # fmt: skip
         worst = late, late_s
     return worst
+
+
+def outside_s(window_s: tuple[float, float] | None, depart_s: float, arrive_s: float) -> float:
+    """By how many seconds an arrival is outside its window: negative before it, positive after it; 0 without one."""
+    if window_s is None or not math.isfinite(arrive_s):
+        return 0.0
+    off_s = arrive_s - min(max(arrive_s, window_s[0]), window_s[1])
+    return off_s if abs(off_s) > max(WINDOW_PART * (arrive_s - depart_s), WINDOW_S) else 0.0
 
 
 def energy_of(
@@ -141,6 +155,14 @@ class Performance:
     battery_used_percent: float | None
     not_flown: tuple[Note, ...] = ()
     paper_energy: bool = False
+    window_s: tuple[float, float] | None = None
+
+    @property
+    def inside_runs(self) -> int | None:
+        """In how many runs it arrived inside its window; None without one."""
+        if self.window_s is None:
+            return None
+        return sum(math.isfinite(a) and not outside_s(self.window_s, self.depart_s, a) for a in self.arrive_s)
 
     @property
     def errors_s(self) -> tuple[float, ...]:
@@ -166,8 +188,14 @@ class Performance:
             "min_agl_at": {"lat": _number(self.min_agl_at[0]), "lon": _number(self.min_agl_at[1])},
             "battery_used_percent": self.battery_used_percent,
             "energy_figures": None if self.battery_used_percent is None else "paper" if self.paper_energy else "own",
-            **in_json("not_flown", self.not_flown),
+            **self._window_in_json(), **in_json("not_flown", self.not_flown),
         }  # fmt: skip
+
+    def _window_in_json(self) -> dict[str, Any]:
+        if self.window_s is None:
+            return {}
+        earliest_s, latest_s = map(_number, self.window_s)
+        return {"arrive_earliest_s": earliest_s, "arrive_latest_s": latest_s, "inside_window_runs": self.inside_runs}
 
     def row(self, runs: int, units: Units = METRIC, decimals: int = 0) -> dict[str, str]:
         """Return a table row over ``runs`` runs; its times have ``decimals``."""
@@ -176,6 +204,8 @@ class Performance:
             return duration(value, decimals) if value is None or math.isfinite(value) else "never"
 
         row = {"vehicle": self.name, "leaves": clock(self.depart_s), "planned": clock(self.planned_s)}
+        if self.window_s is not None:
+            row["window"] = " – ".join(map(clock, self.window_s))
         arrived = _median(self.arrive_s)
         row["arrives"] = clock(math.inf if arrived is None or math.isnan(arrived) else arrived)
         error = _median(self.errors_s)
@@ -225,6 +255,12 @@ class Rehearsal:
         if self.breaches:
             return False
         return None if self.not_judged else True
+
+    @property
+    def inside_windows(self) -> tuple[int, int] | None:
+        """How many arrivals of all runs lie inside their windows, and of how many; None without windows."""
+        inside = [v.inside_runs for v in self.vehicles if v.inside_runs is not None]
+        return (sum(inside), self.runs * len(inside)) if inside else None
 
     @property
     def p95_s(self) -> float | None:
@@ -332,6 +368,13 @@ class Tally:
             self._battery(part, spent_j[i])
             if (late := lateness(part, trace)) is not None:
                 self.breach("late", (trace.name,), *late)
+            if part.window_s is not None and (off_s := outside_s(part.window_s, part.depart_s, trace.arrive_s)):
+                earliest_s, latest_s = (at - part.depart_s for at in part.window_s)
+                outside = Note(
+                    "arrived_outside_window", name=trace.name, off_s=abs(off_s), late=off_s > 0.0,
+                    earliest_s=earliest_s, latest_s=latest_s,
+                )  # fmt: skip
+                self.breach("window", (trace.name,), outside, abs(off_s))
             for f in judged.findings:
                 self.breach(f.kind, (trace.name,), f.note, f.by, f.zone)
         self._order(traces)
@@ -427,6 +470,7 @@ class Tally:
                     part.vehicle.name, part.depart_s, part.arrive_s, tuple(self._arrive[i]), tuple(self._end[i]),
                     math.nan if low is None else low.min_agl_m, (math.nan, math.nan) if low is None else low.min_agl_at,
                     self._used_percent(part, self.most_j[i]), not_flown[i], part.vehicle.energy.papers,
+                    part.window_s,
                 )
             )  # fmt: skip
         breaches = sorted(self._breaches.values(), key=lambda b: (-b.runs, b.kind, b.vehicles))

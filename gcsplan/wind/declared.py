@@ -80,16 +80,35 @@ class DeclaredWind:
         gust_m_s = None if self.gust_m_s is None else factor * self.gust_m_s
         return replace(self, speed_m_s=factor * self.speed_m_s, gust_m_s=gust_m_s)
 
+    def along_m_s(self, courses_rad: Floats) -> Floats:
+        """(N,) the most that any wind of the set, with its gusts, blows along courses (N,), from east to north."""
+        low, high = self.speed_m_s[..., 0], self.speed_m_s[..., 1]
+        # A wind from 270° blows towards the east, course 0.
+        first = 270.0 - self.from_deg[..., 1]
+        span = np.diff(self.from_deg)[..., 0]
+        past = (np.degrees(courses_rad)[:, None, None] - first) % 360.0
+        off = np.minimum(np.maximum(past - span, 0.0), 360.0 - past)
+        cosine = np.cos(np.radians(np.where(past <= span, 0.0, off)))
+        most: Floats = np.where(cosine > 0.0, high * cosine, low * cosine).max(axis=(1, 2)) + self.gusts_add_m_s
+        return most
+
     def vectors_m_s(self, shares: Floats, amsl_m: Floats, agl_m: Floats, at_s: Floats) -> Floats:
         """(K, N, 2) the wind's velocity, east and north, for ``shares`` (K, 2) at N heights and times.
 
         ``amsl_m``, ``agl_m`` (N,) are heights of the same points; ``at_s`` (N,) are seconds UTC since 1970.
         """
+        return self._at(self._levels(shares), amsl_m, agl_m, at_s)
+
+    def each_m_s(self, shares: Floats, amsl_m: Floats, agl_m: Floats, at_s: Floats) -> Floats:
+        """(N, 2) as `vectors_m_s`, but ``shares`` (N, 2) has a share for each of the N heights and times."""
+        return self._at(self._levels(shares), amsl_m, agl_m, at_s, np.arange(len(shares)))
+
+    def _levels(self, shares: Floats) -> Floats:
+        """(K, T, L, 2) the vectors of each share at all hours and heights of the set."""
         low, turn = self.speed_m_s[..., 0], np.radians(self.from_deg[..., 0])
         speed = low + shares[:, 0, None, None] * (self.speed_m_s[..., 1] - low)
         angle = turn + shares[:, 1, None, None] * (np.radians(self.from_deg[..., 1]) - turn)
-        levels = np.stack([-speed * np.sin(angle), -speed * np.cos(angle)], axis=-1)  # towards where it blows
-        return self._at(levels, amsl_m, agl_m, at_s)
+        return np.stack([-speed * np.sin(angle), -speed * np.cos(angle)], axis=-1)  # towards where it blows
 
     def bow_m_s(self, cells: Floats, amsl_m: Floats, agl_m: Floats, at_s: Floats) -> Floats:
         """(K, N) how far winds of cells of shares lie at most beyond the quadrangle of the winds at their corners, m/s.
@@ -102,13 +121,18 @@ class DeclaredWind:
         bow = speed * np.minimum(0.125 * turn**2, 2.0)
         return self._at(bow[..., None], amsl_m, agl_m, at_s)[..., 0]
 
-    def _at(self, levels: Floats, amsl_m: Floats, agl_m: Floats, at_s: Floats) -> Floats:
-        """(K, N, C) values of ``levels`` (K, T, L, C), interpolated linearly in time and height."""
+    def _at(
+        self, levels: Floats, amsl_m: Floats, agl_m: Floats, at_s: Floats, rows: slice | np.ndarray = slice(None)
+    ) -> Floats:
+        """(K, N, C) values of ``levels`` (K, T, L, C), interpolated linearly in time and height.
+
+        (N, C) with ``rows`` (N,): the row of ``levels`` for each point.
+        """
         t0, t1, dt = _between(self.times_s, at_s)
         h0, h1, dh = _between(self.heights_m, amsl_m if self.heights == "amsl" else agl_m)
         dt, dh = dt[:, None], dh[:, None]
-        early = levels[:, t0, h0] + dh * (levels[:, t0, h1] - levels[:, t0, h0])
-        late = levels[:, t1, h0] + dh * (levels[:, t1, h1] - levels[:, t1, h0])
+        early = levels[rows, t0, h0] + dh * (levels[rows, t0, h1] - levels[rows, t0, h0])
+        late = levels[rows, t1, h0] + dh * (levels[rows, t1, h1] - levels[rows, t1, h0])
         at: Floats = early + dt * (late - early)
         return at
 

@@ -18,7 +18,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mav
 from gcsplan.app.fleet.pipeline import plan
 from gcsplan.app.parallel.executor import Inline
 from gcsplan.app.plan.model import Plan
-from gcsplan.app.rehearse import parts_of, rehearse, rehearse_in_sitl, seats_of, terms_of
+from gcsplan.app.rehearse import parts_of, rehearse, rehearse_in_sitl, seats_of, terms_of, weather_of
 from gcsplan.errors import CheckFailed, LinkError, UsageError, VehicleRefused
 from gcsplan.mission_file import load_mission
 from gcsplan.sim.flight.mission_flight import fly
@@ -48,6 +48,34 @@ arrival: {mode: sequence, order: [uav3, uav1, uav2], interval_s: 8, separation_m
 planner: {name: optimal, objective: length, seed: 1}
 altitude_frame: relative
 """
+
+
+WINDY = {
+    "version": 1, "name": "windy", "terrain": {"flat_m": 300}, "limits": {"min_agl_m": 30},
+    "wind": {"speed_m_s": [2, 6], "from_deg": [250, 300], "gust_m_s": 8},
+    "vehicles": [{"name": "uav1", "sysid": 1, "autopilot": "arducopter", "start": [36.6, -84.3],
+                  "goal": [36.605, -84.3], "speed_m_s": [3, 10], "lean_angle_deg": 45}],
+}  # fmt: skip
+
+
+def test_runs_draw_from_the_declared_winds_unless_a_wind_is_given() -> None:
+    source = load_mission(WINDY)
+    assert weather_of(source, None, None, 0.0, 0.5) == Weather(noise_m=0.5, declared=source.wind)
+    assert weather_of(source, 3.0, None, 0.0, 0.0) == Weather(3.0)
+    assert weather_of(source, 0.0, None, 0.0, 0.0) == Weather()
+    assert weather_of(source, None, None, 2.0, 0.0) == Weather(gusts_m_s=2.0)
+    still = load_mission({key: value for key, value in WINDY.items() if key != "wind"})
+    assert weather_of(still, None, None, 0.0, 0.0) == Weather()
+    hour = "2026-11-24T10:00Z"
+    assert weather_of(load_mission(WINDY | {"at": hour}), None, None, 0.0, 0.0).start_s == 1795514400.0
+
+
+@pytest.mark.slow
+def test_a_drawn_wind_is_told_in_the_document() -> None:
+    planned = plan(load_mission(WINDY))
+    result = rehearse(planned, weather=weather_of(planned.source, None, None, 0.0, 0.0), runs=2)
+    assert result.runs == 2
+    assert result.as_dict()["weather"]["drawn_from"] == {"most_m_s": 6.0, "gust_m_s": 8.0, "varying": False}
 
 
 @pytest.fixture(scope="module")

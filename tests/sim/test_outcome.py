@@ -13,7 +13,7 @@ import pytest
 
 from gcsplan.notes.note import Note
 from gcsplan.sim.flight.trace import Trace
-from gcsplan.sim.outcome import Terms, energy_of, lateness, percentile_95
+from gcsplan.sim.outcome import Tally, Terms, energy_of, lateness, outside_s, percentile_95
 from gcsplan.sim.rehearsal import rehearse
 from gcsplan.units import METRIC
 from gcsplan.vehicle import Energy
@@ -121,6 +121,44 @@ def test_nothing_is_late_that_never_arrives_or_has_no_plan() -> None:
     part = a_part(1, (0, 0), (1000, 0), arrive_s=100.0)
     assert lateness(part, trace(math.nan, 900.0)) is None
     assert lateness(replace(part, arrive_s=None), trace(900.0, 999.0)) is None
+
+
+def test_an_arrival_is_outside_its_window_by_more_than_the_two_models_of_motion_differ() -> None:
+    window_s = 100.0, 120.0
+    assert outside_s(window_s, 0.0, 110.0) == 0.0
+    assert outside_s(window_s, 0.0, 120.6) == 0.0
+    assert outside_s(window_s, 0.0, 121.0) == pytest.approx(1.0)
+    assert outside_s(window_s, 0.0, 98.0) == pytest.approx(-2.0)
+    assert outside_s((1000.0, 1000.0), 0.0, 1004.0) == 0.0
+    assert outside_s(window_s, 0.0, math.nan) == 0.0
+    assert outside_s(None, 0.0, 500.0) == 0.0
+
+
+def test_arrivals_in_a_window_are_counted_and_one_outside_is_a_violation() -> None:
+    part = replace(a_part(1, (0, 0), (1000, 0), depart_s=5.0, arrive_s=205.0), window_s=(155.0, 305.0))
+    tally = Tally([part], Terms())
+    for arrives_s in (160.0, 300.0, 310.0):
+        tally.add([trace(arrives_s, arrives_s + 60.0)], FLAT, [0.0])
+    result = tally.result("gcsplan", 1, {}, [()])
+    assert result.inside_windows == (2, 3)
+    assert "window" in kinds(result)
+    told = next(str(b.note(3)) for b in result.breaches if b.kind == "window")
+    assert told == (
+        "uav1 arrived 5.0 s after its window, which is 150.0 s to 300.0 s after its departure (in 1 of 3 runs)"
+    )
+    row = result.as_dict()["vehicles"][0]
+    assert (row["arrive_earliest_s"], row["arrive_latest_s"], row["inside_window_runs"]) == (155.0, 305.0, 2)
+    assert result.rows()[0]["window"] == "0:02:35 – 0:05:05"
+    assert result.error() is not None
+
+
+def test_without_a_window_nothing_tells_of_one() -> None:
+    tally = Tally([a_part(1, (0, 0), (1000, 0), arrive_s=205.0)], Terms())
+    tally.add([trace(200.0, 260.0)], FLAT, [0.0])
+    result = tally.result("gcsplan", 1, {}, [()])
+    assert result.inside_windows is None
+    assert "window" not in result.rows()[0]
+    assert "inside_window_runs" not in result.as_dict()["vehicles"][0]
 
 
 def test_the_energy_of_a_path_is_its_climb_its_metres_its_time_and_its_holds() -> None:

@@ -23,7 +23,7 @@ from gcsplan.app.plan.model import Brief, FleetPlan, Plan, VehiclePlan
 from gcsplan.app.plan.vehicle import over_one_terrain, rebuilt
 from gcsplan.arrays import Floats
 from gcsplan.check.flight.times import over_ground, pace_over_ground
-from gcsplan.check.motion.circles import PLANE_LOITER_RADIUS_M, circle_growth
+from gcsplan.check.motion.circles import PLANE_LOITER_RADIUS_M, circle_reach_m
 from gcsplan.check.verdict import LegFigures
 from gcsplan.errors import NoMission, heed_cancel
 from gcsplan.fleet.arrival import Craft, Crew, NoSchedule, Schedule, Slot, schedule
@@ -65,7 +65,9 @@ def _circling_m(v: VehiclePlan) -> float:
         return 0.0  # circles for climbing are part of the motion
     highest = max(leg.end[2] for leg in v.verdict.legs)
     radius = wing.circle_m if v.request.end == "loiter" else PLANE_LOITER_RADIUS_M
-    return max(radius, math.ceil(v.request.vehicle.turn_radius_m)) * circle_growth(highest)
+    vehicle = v.request.vehicle
+    radius = max(radius, math.ceil(vehicle.turn_radius_m))
+    return circle_reach_m(radius, highest, vehicle.speed_max_m_s, vehicle.wind_m_s)
 
 
 def _line(legs: Sequence[LegFigures], world: World) -> Floats:

@@ -111,6 +111,10 @@ def _how(result: Rehearsal, units: Units) -> str:
     calm = not (wind or gusts or noise)
     of_wind, of_gusts, of_noise = stated(wind, units.speed), stated(gusts, units.speed), stated(noise, units.distance)
     air = "in still air" if calm else f"with {of_wind} of wind, gusts of {of_gusts} and {of_noise} of noise"
+    if (declared := result.weather.get("drawn_from")) is not None:
+        air = (
+            f"in winds of up to {stated(declared['most_m_s'], units.speed)}, drawn from those that the mission declares"
+        )
     text = f"Flown by {by} {air}, from the missions that they stored."
     if result.runs == 1:
         return text

@@ -8,7 +8,7 @@ goal is made likewise, backwards. The planner joins the ends. Then the mission i
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import chain, pairwise
 
@@ -22,12 +22,15 @@ from gcsplan.check.fixed_wing.ends import (
     REACHED_M,
     above_slant,
     beside_strip,
+    blown_slant,
     circle_missing_m,
+    drift_of,
     flared,
+    landing_speeds_m_s,
     over_m,
     slant_shortage,
 )
-from gcsplan.check.motion.circles import circle_growth
+from gcsplan.check.motion.circles import circle_reach_m
 from gcsplan.errors import NoMission
 from gcsplan.mavlink.build.fixed_wing import pitch_deg
 from gcsplan.mavlink.build.order import FLOWN_SLOPE, MARGINS, Order, Wing
@@ -135,7 +138,7 @@ def _joined(
             bound = bound_between(brief, inner, solution.path.points, start, goal, vehicle, world)
             solution = with_bound(solution, bound, problem)
         speed = vehicle.speed_max_m_s
-        notes = tuple(_notes(start, goal))
+        notes = (*_notes(start, goal), *_why_so(problem, request, goal))
         straight_m = 0.0 if start.circle is not None else math.dist(start.top[:2], start.ground[:2])
         if straight_m >= LONG_CLIMB_OUT_M and not verdict.findings:
             notes += tuple(_circles_instead(brief, request, limited, problem, sharp, world))
@@ -151,7 +154,9 @@ def _joined(
 def _with_goal_circle(problem: Problem, request: VehicleRequest) -> Problem:
     """Raise the goal as high as the flight around it needs: the circle of a loiter, or the turn for home."""
     east, north, amsl = problem.goal
-    around = {"loiter": around_m(problem) * circle_growth(amsl + 100.0), "rtl": 2.0 * problem.turn_radius_m}
+    vehicle = request.vehicle
+    circle_m = circle_reach_m(around_m(problem), amsl + 100.0, vehicle.speed_max_m_s, vehicle.wind_m_s)
+    around = {"loiter": circle_m, "rtl": 2.0 * problem.turn_radius_m}
     reach_m = around.get(request.end)
     if reach_m is None:
         return problem
@@ -170,13 +175,14 @@ def _with_goal_circle(problem: Problem, request: VehicleRequest) -> Problem:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _EndRules:
-    """The rules of the check for one end, as the planner asks for them (`EndJudge`).
+    """The rules of the check for one end of a vehicle's flight, as the planner asks for them (`EndJudge`).
 
     ``lands_m_s`` is the speed of a landing, 0 for a take-off, and ``over``: how far a take-off gets above its altitude,
     m.
     """
 
     problem: Problem
+    vehicle: Vehicle
     lands_m_s: float = 0.0
     over: float = 0.0
     reached_m: float = REACHED_M
@@ -184,23 +190,33 @@ class _EndRules:
     def slant_clear(self, ground: Floats, top: Floats) -> bool:
         """See `EndJudge.slant_clear`."""
         limits, air = self.problem.limits, self.problem.airspace
-        lines = [np.array([ground, top])]
+        lines = [(ground, top, 0.0)]
         if self.lands_m_s > 0.0:
-            below = flared(numbers_of(top), numbers_of(ground), math.dist(top[:2], ground[:2]), self.lands_m_s)
-            lines += [np.array([b, a]) for a, b in pairwise(below)]
-        elif not all(
-            column_clear(np.array(a), np.array(b), 0.0, limits, air, band_m)
-            for a, b, band_m in above_slant(numbers_of(ground), numbers_of(top), limits, self.over)
-        ):
-            return False
+            run_m = math.dist(top[:2], ground[:2])
+            for speed_m_s in landing_speeds_m_s(self.vehicle, self.lands_m_s):
+                below = flared(numbers_of(top), numbers_of(ground), run_m, speed_m_s)
+                lines += [(np.array(b), np.array(a), 0.0) for a, b in pairwise(below)]
+        else:
+            way, low, high = top[:2] - ground[:2], numbers_of(ground), numbers_of(top)
+            aside_m, from_part = drift_of(self.vehicle, float(way[0]), float(way[1]))
+            if not all(
+                column_clear(np.array(a), np.array(b), aside_m, limits, air, band_m)
+                for a, b, band_m in above_slant(low, high, limits, self.over)
+            ):
+                return False
+            lines += [
+                (np.array(a), np.array(b), reach_m) for a, b, reach_m in blown_slant(low, high, aside_m, from_part)
+            ]
         return all(
-            column_clear(line[0], line[1], 0.0, limits, air) and slant_shortage(line, ground, 0.0, limits, air) is None
-            for line in lines
+            column_clear(a, b, reach_m, limits, air)
+            and slant_shortage(np.array([a, b]), ground, reach_m, limits, air) is None
+            for a, b, reach_m in lines
         )
 
     def circle_growth(self, amsl_m: float) -> float:
         """See `EndJudge.circle_growth`."""
-        return circle_growth(amsl_m)
+        radius_m = around_m(self.problem)
+        return circle_reach_m(radius_m, amsl_m, self.vehicle.speed_max_m_s, self.vehicle.wind_m_s) / radius_m
 
     def circle_missing_m(self, middle: Floats, reach_m: float) -> float:
         """See `EndJudge.circle_missing_m`."""
@@ -209,10 +225,10 @@ class _EndRules:
 
 def starts(problem: Problem, request: VehicleRequest, sharp: Floats) -> Iterator[FlightEnd]:
     """Climb-outs, on the requested heading or the most natural ones first. Raises NoMission if there is none."""
-    slope = math.tan(math.radians(pitch_deg(request.vehicle)))
+    slope = math.tan(math.radians(pitch_deg(request.vehicle))) * request.vehicle.tail_ratio
     given = request.takeoff_heading_deg
     heading = None if given is None else math.radians(90.0 - given)
-    rules = _EndRules(problem, over=over_m(request.vehicle))
+    rules = _EndRules(problem, request.vehicle, over=over_m(request.vehicle))
     required = RequiredEnd(np.array(request.start), slope, request.takeoff_agl_m, heading, rules)
     if request.climb_out == "circles":
         return _some(
@@ -237,14 +253,50 @@ def goals(problem: Problem, request: VehicleRequest, sharp: Floats) -> Iterator[
     if request.end != "land":
         return iter([None])
     slope = request.vehicle.limits.max_descent_slope * (1.0 - FLOWN_SLOPE)
-    rules = _EndRules(problem, lands_m_s=request.vehicle.speed_max_m_s)
-    required = RequiredEnd(np.array(request.goal), slope, request.approach_agl_m, None, rules)
+    rules = _EndRules(problem, request.vehicle, lands_m_s=request.vehicle.speed_max_m_s)
+    rank = _landing_rank(problem, request)
+    required = RequiredEnd(np.array(request.goal), slope, request.approach_agl_m, None, rules, rank)
     return _some(
         straight_ends(problem, required, sharp[::-1]),
         f"{request.vehicle.name}: no straight approach to the goal, on any heading, clears the ground and the "
         f"zones at max_descent_deg {request.vehicle.limits.max_descent_deg:g}: use end: loiter, or another goal"
         f"{beside_strip(problem.airspace)}",
     )
+
+
+INTO_WIND = 0.15
+"""The part of the way from the best to the worst wind for landing within which a heading is into the wind: 45° of a
+constant wind."""
+LEAST_WIND_M_S = 1.0
+"""Winds for landing that differ by less, m/s, decide nothing."""
+UPHILL_M, UPHILL = 100.0, 0.05
+"""How far before a landing its ground is looked at, m, and from which slope on a landing leads uphill or downhill."""
+
+
+def _landing_rank(problem: Problem, request: VehicleRequest) -> Callable[[float], float]:
+    """The rank of an approach's heading, seen outwards: a landing with a wind behind, or down a slope, comes later."""
+
+    def rank(heading: float) -> float:
+        return max(0.0, _from_behind(request.vehicle, heading)) + max(0.0, _falls(problem, request.goal, heading))
+
+    return rank
+
+
+def _from_behind(vehicle: Vehicle, heading: float) -> float:
+    """How much the declared winds blow from behind in a landing, in steps from 0, into them; 0 without a wind."""
+    blows_m_s = [vehicle.blows_along_m_s(heading + math.pi), *vehicle.blows_m_s]
+    best, worst = min(blows_m_s), max(blows_m_s)
+    if worst - best < LEAST_WIND_M_S:
+        return 0.0
+    return float(math.floor((blows_m_s[0] - best) / (worst - best) / INTO_WIND))
+
+
+def _falls(problem: Problem, goal: tuple[float, float, float], heading: float) -> float:
+    """1 if a landing leads downhill, -1 if uphill, 0 on about level or unknown ground."""
+    east, north = (goal[k] + UPHILL_M * trig(heading) for k, trig in enumerate((math.cos, math.sin)))
+    higher_m = float(problem.airspace.surface.ground_at(east, north)) - goal[2]
+    steep = not math.isnan(higher_m) and abs(higher_m) >= UPHILL * UPHILL_M
+    return math.copysign(1.0, higher_m) if steep else 0.0
 
 
 def _some(ends: Iterator[FlightEnd], refusal: str) -> Iterator[FlightEnd]:
@@ -328,6 +380,17 @@ def _circles_instead(
             "circles_instead", far_m=made["far_m"], circle_m=made["circle_m"], up_m=made["circled_m"],
             length_m=tried.verdict.length_m,
         )  # fmt: skip
+
+
+def _why_so(problem: Problem, request: VehicleRequest, goal: FlightEnd | None) -> Iterator[Note]:
+    """Why it lands on its heading: into the wind, uphill; nothing where neither decides."""
+    if goal is None:
+        return
+    behind, falls = _from_behind(request.vehicle, goal.heading), _falls(problem, request.goal, goal.heading)
+    windy = max(request.vehicle.blows_m_s, default=0.0) - min(request.vehicle.blows_m_s, default=0.0) >= LEAST_WIND_M_S
+    into = windy and behind <= 0.0
+    if into or falls < 0.0:
+        yield Note("approach_into_wind", uphill=falls < 0.0) if into else Note("approach_uphill")
 
 
 def _notes(start: FlightEnd, goal: FlightEnd | None) -> Iterator[Note]:

@@ -7,7 +7,8 @@ What is assumed of ArduPlane (commands_logic.cpp, `verify_nav_wp`; AP_L1_Control
 - If that is not the tangent length of the corner, the arc moves along the leg before it by the difference, and the leg
   after it moves to the side by the difference times the turn's sine: both legs are widened by that, the leg after it
   until the aircraft is back on it (`SETTLES_S`).
-- The aircraft leaves the arc in calm air too (`tracking_m`): the excess over ``track_error_m`` widens both legs, too.
+- The aircraft leaves the arc, in calm air too (`tracking_m`): the excess over ``track_error_m`` widens both legs, too.
+  In declared winds the worst of them counts, and the bank that the arc needs with that wind behind.
 - Altitude changes evenly along what is flown, from the middle of one arc to the middle of the next. ArduPlane instead
   computes it along the straight line between way points, and aims at the altitude of the way point once a turn begins:
   all altitudes between these are judged too (``Flight.instead``).
@@ -83,7 +84,7 @@ def bend(flight: Flight, mission: Mission, vehicle: Vehicle, frame: Frame, tunin
         period_s = tuning.l1_period_s
         flight.not_judged.append(Note("l1_period_out_of_range", period_s=period_s, least_s=least_s, most_s=most_s))
         return
-    fastest = max((s.speed_m_s for s in flight.stretches), default=0.0)
+    fastest = max((s.speed_m_s for s in flight.stretches), default=0.0) + vehicle.wind_m_s
     bank_deg = math.degrees(math.atan(fastest**2 / (GRAVITY_M_S2 * radius)))
     if bank_deg > MOST_BANK_DEG:
         flight.not_judged.append(
@@ -119,7 +120,9 @@ def bend(flight: Flight, mission: Mission, vehicle: Vehicle, frame: Frame, tunin
     if wander_m > 0.0:
         wider = wander_m > error_m
         off = Note("turns_off_arcs", period_s=tuning.l1_period_s, wander_m=wander_m, wider=wider)
-    note = Note("turns_as_arcs", radius_m=radius, error_m=error_m, bank_deg=bank_deg, speed_m_s=fastest, off=off)
+    note = Note(
+        "turns_as_arcs", radius_m=radius, error_m=error_m, bank_deg=bank_deg, speed_m_s=round(fastest, 1), off=off
+    )
     if note not in flight.notes:
         flight.notes.append(note)
 
@@ -146,7 +149,7 @@ class _Run:
         tuning: Tuning,
     ) -> None:  # fmt: skip
         self.tuning = tuning
-        self.run, self.frame, self.radius = run, frame, vehicle.turn_radius_m
+        self.run, self.frame, self.radius, self.wind_m_s = run, frame, vehicle.turn_radius_m, vehicle.wind_m_s
         self.error_m, self.wander_m = vehicle.limits.track_error_m, 0.0
         places = np.array([run[0].start, *(s.end for s in run)])
         self.points = np.column_stack([frame.to_plane(places[:, 0], places[:, 1]), places[:, 2]])
@@ -181,7 +184,7 @@ class _Run:
             tangent = tangent_m(self.radius, turn)
             begins = self._begins_m(mission, s, abs(turn), flight)
             early_m, late_m = (abs(b - tangent) for b in begins)
-            wander_m = tracking_m(self.radius, turn, true_m_s(s), self.tuning)
+            wander_m = tracking_m(self.radius, turn, true_m_s(s), self.tuning, self.wind_m_s)
             self.wander_m = max(self.wander_m, wander_m)
             off_m = max(early_m, late_m) * math.sin(min(abs(turn), 0.5 * math.pi))
             off_m += max(0.0, wander_m - self.error_m)
@@ -220,8 +223,8 @@ class _Run:
         if note not in flight.notes:
             flight.notes.append(note)
         thin = circle_growth(max(s.start[2], s.end[2]))  # WP_RADIUS grows with altitude as circles do
-        least = self.tuning.plane_turns_m(s.speed_m_s, turn)
-        return least, self.tuning.plane_turns_m(s.speed_m_s * math.sqrt(thin), turn, thin)
+        least = self.tuning.plane_turns_m(max(s.speed_m_s - self.wind_m_s, 0.0), turn)
+        return least, self.tuning.plane_turns_m(s.speed_m_s * math.sqrt(thin) + self.wind_m_s, turn, thin)
 
     def _widen_m(self, k: int, *, settled: bool = False) -> float:
         """How much a leg is widened, m: for a turn before it until it ``settled``, and for a circle at its start."""
@@ -229,7 +232,8 @@ class _Run:
 
     def _settles_m(self, k: int, off_m: float) -> float:
         """After how many metres of its straight part an aircraft that begins leg ``k`` ``off_m`` off is back on it."""
-        return SETTLES_S * self.tuning.l1_slower * true_m_s(self.run[k]) + off_m if off_m > 0.0 else 0.0
+        over_ground = true_m_s(self.run[k]) + self.wind_m_s
+        return SETTLES_S * self.tuning.l1_slower * over_ground + off_m if off_m > 0.0 else 0.0
 
     def _track(self, k: int) -> list[tuple[Floats, float, float]]:
         """Leg ``k`` as flown: (east and north, metres flown, how far the piece up to there may lie elsewhere)."""

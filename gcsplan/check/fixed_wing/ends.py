@@ -9,6 +9,10 @@ not along the leg from the item's place: one that climbs well is there early (`t
 heading, so the climb-out is judged towards the item's place, as maps draw it; if the item has no place, towards the
 next item.
 
+In declared winds (`Vehicle.blows_m_s`) the slant is the one over ground with the strongest wind behind, for a wind adds
+to the speed over ground and not to the climb. The climb-out and the ways from it to the next item are widened by how
+far a wind across its heading carries it aside (`drift_m`).
+
 Climb-outs and glides (`glide`) are exempt from min AGL, climb angle and terrain clearance, as columns are; never from
 zones, their clearance and ceilings. They must keep a clearance over the ground and what stands on it: the altitude
 error. Near the ends, where that is more than half of the height above the touch point, the aircraft is over the landing
@@ -30,7 +34,7 @@ from itertools import pairwise, takewhile
 import numpy as np
 
 from gcsplan.arrays import Floats
-from gcsplan.check.motion.circles import circle_growth
+from gcsplan.check.motion.circles import circle_reach_m
 from gcsplan.check.motion.flight_state import Aboard
 from gcsplan.check.motion.spline import towards
 from gcsplan.check.motion.stopping import about_turn_m
@@ -95,8 +99,9 @@ def climb_out(pilot: Aboard, seq: int, item: MissionItem, after: MissionItem | N
         pilot.known = False
         return
     pitch = item.params[0] if item.params[0] > 0.0 else LEAST_PITCH_DEG
-    climb_deg = min(pitch, pilot.vehicle.limits.max_climb_deg)
-    run_m = (top - ground) / math.tan(math.radians(climb_deg))
+    climb_deg = min(pitch, pilot.vehicle.steepest_in_air_deg)
+    in_air_m = (top - ground) / math.tan(math.radians(climb_deg))
+    run_m = in_air_m / pilot.vehicle.tail_ratio
     end = ahead
     for _ in range(2):  # metres per degree change with the latitude, so the first end is millimetres off
         part = run_m / flat_m((lat, lon, 0.0), end)
@@ -107,11 +112,50 @@ def climb_out(pilot: Aboard, seq: int, item: MissionItem, after: MissionItem | N
     pilot.note(
         Note("climb_out_straight", seq, climb_deg=climb_deg, heading_deg=heading_deg, run_m=run_m, counted=counted)
     )
-    pilot.note(Note("climb_out_drifts", seq, drift_m=run_m / max(pilot.pace.speed_m_s, 1.0)))
+    aside_m, from_part = drift_of(pilot.vehicle, *offset_m(pilot.home, end))
+    if pilot.vehicle.blows_m_s:
+        pilot.note(Note("climb_out_blown", seq, drift_m=aside_m, wind_m_s=pilot.vehicle.wind_m_s))
+    else:
+        pilot.note(Note("climb_out_drifts", seq, drift_m=in_air_m / max(pilot.pace.speed_m_s, 1.0)))
     pilot.add(seq, "takeoff", pilot.home, end, column=True)
+    for low, high, reach_m in blown_slant(pilot.home, end, aside_m, from_part):
+        pilot.instead(seq, "takeoff", low, high, column=True, reach_m=reach_m)
     for low, high, band_m in above_slant(pilot.home, end, pilot.vehicle.limits, over_m(pilot.vehicle)):
-        pilot.instead(seq, "takeoff", low, high, column=True, band_m=band_m)
+        pilot.instead(seq, "takeoff", low, high, column=True, band_m=band_m, reach_m=aside_m)
     pilot.at, pilot.direction = end, towards(pilot.home, end)
+
+
+BLOWN_PARTS = 4
+"""Parts of a climb-out, each as wide as it is blown aside at its end."""
+
+
+def drift_m(vehicle: Vehicle, ground: Place, top: Place) -> float:
+    """How far the declared winds carry a climb-out aside until its top, m; 0 in still air."""
+    return drift_of(vehicle, *offset_m(ground, top))[0]
+
+
+def drift_of(vehicle: Vehicle, east_m: float, north_m: float) -> tuple[float, float]:
+    """As `drift_m`, by the way over ground from the start to the top; and the part of it on which it may be so far.
+
+    The climb takes as long as its way through the air at the slowest speed; against a wind it is on a shorter way.
+    """
+    course, slowest = math.atan2(north_m, east_m), vehicle.speed_min_m_s
+    seconds = math.hypot(east_m, north_m) * vehicle.tail_ratio / slowest
+    against = max(1.0 - vehicle.tail_m_s(course + math.pi) / slowest, 0.0)
+    return seconds * vehicle.aside_m_s(course), vehicle.tail_ratio * against
+
+
+def blown_slant(ground: Place, top: Place, aside_m: float, from_part: float) -> list[tuple[Place, Place, float]]:
+    """A climb-out that is carried aside by ``aside_m``, from a part of its way on: parts, and how far each is carried.
+
+    None if it is not. A place may be any three numbers.
+    """
+    if not aside_m > 0.0:
+        return []
+    ends = [k / BLOWN_PARTS for k in range(BLOWN_PARTS + 1)]
+    at = [(*between(ground, top, part), ground[2] + part * (top[2] - ground[2])) for part in ends]
+    carried = [aside_m * min(1.0, part / max(from_part, 1e-9)) for part in ends]
+    return [(at[k], at[k + 1], carried[k + 1]) for k in range(BLOWN_PARTS)]
 
 
 def above_slant(ground: Place, top: Place, limits: Limits, over_m: float) -> list[tuple[Place, Place, float]]:
@@ -154,7 +198,7 @@ def circle_up(pilot: Aboard, seq: int, item: MissionItem, radius_m: float) -> bo
     target = pilot.target(item) if pilot.has_place(item) else None
     if before is None or target is None or not slants([before]) or before.kind != "takeoff":
         return False
-    reach_m = radius_m * circle_growth(target[2])
+    reach_m = circle_reach_m(radius_m, target[2], pilot.vehicle.speed_max_m_s, pilot.vehicle.wind_m_s)
     if target[2] <= pilot.at[2] or flat_m(pilot.at, target) > reach_m:
         return False
     low = (*target[:2], pilot.at[2])
@@ -162,7 +206,8 @@ def circle_up(pilot: Aboard, seq: int, item: MissionItem, radius_m: float) -> bo
     for a, b in pairwise(_helix(pilot.at, target, radius_m, turns, pilot.vehicle.limits.max_climb_slope)):
         pilot.add(seq, "takeoff", a, b, column=True, reach_m=reach_m - radius_m + CIRCLE_CHORD_M)
     pilot.add(seq, "takeoff", target, target, reach_m=reach_m)
-    pilot.instead(seq, "takeoff", low, target, column=True, reach_m=reach_m)
+    blown_m = drift_m(pilot.vehicle, pilot.home, pilot.at)
+    pilot.instead(seq, "takeoff", low, target, column=True, reach_m=reach_m + blown_m)
     # A climb that is steeper than judged reaches these altitudes before the circle.
     middle, half = 0.5 * (low[2] + target[2]), 0.5 * (target[2] - low[2])
     start, end = ((*place[:2], middle) for place in (pilot.home, pilot.at))
@@ -332,9 +377,10 @@ def turns_early(pilot: Aboard, seq: int, after: MissionItem | None) -> None:
     way, rest = offset_m(place, target), offset_m(place, end)
     part = min(max((rest[0] * way[0] + rest[1] * way[1]) / max(way[0] ** 2 + way[1] ** 2, 1e-9), 0.0), 1.0)
     aside_m = math.hypot(rest[0] - part * way[0], rest[1] - part * way[1])
-    if aside_m <= pilot.vehicle.limits.track_error_m:
+    blown_m = drift_m(pilot.vehicle, home, end)
+    if aside_m <= pilot.vehicle.limits.track_error_m and not blown_m:
         return
-    parts = min(math.ceil(aside_m / max(pilot.vehicle.limits.track_error_m, 1.0)), MOST_BANDS)
+    parts = min(math.ceil(max(aside_m, 1e-9) / max(pilot.vehicle.limits.track_error_m, 1.0)), MOST_BANDS)
     half = over_m(pilot.vehicle) / 2.0
     terrain = m.FRAME_SYNONYMS.get(after.frame, after.frame) == m.TERRAIN
     for k in range(parts):
@@ -344,7 +390,7 @@ def turns_early(pilot: Aboard, seq: int, after: MissionItem | None) -> None:
         length = math.hypot(*ahead) * math.hypot(*turn)
         cosine = (ahead[0] * turn[0] + ahead[1] * turn[1]) / max(length, 1e-9)
         swing_m = 0.5 * (1.0 - cosine) * about_turn_m(pilot.vehicle, pilot.pace.speed_m_s, end[2])
-        gap_m = 0.5 * (1.0 - first) * math.hypot(*ahead) / parts * math.sqrt(max(0.0, 1.0 - cosine**2))
+        gap_m = 0.5 * (1.0 - first) * math.hypot(*ahead) / parts * math.sqrt(max(0.0, 1.0 - cosine**2)) + blown_m
         pilot.instead(seq, "cruise", start, target, terrain=terrain, reach_m=swing_m + gap_m)
         pilot.at_once(seq, "cruise", start, target, terrain=terrain, reach_m=swing_m + gap_m)
         if half > 0.0:
@@ -434,9 +480,16 @@ def glide(pilot: Aboard, seq: int, item: MissionItem) -> None:
     pilot.note(Note("glide_straight", seq))
     pilot.note(_downhill(pilot, seq, end))
     pilot.add(seq, "land", pilot.at, end, column=True)
-    for a, b in pairwise(flared(pilot.at, end, flat_m(pilot.at, end), pilot.pace.speed_m_s)):
-        pilot.instead(seq, "land", a, b, column=True)
+    for speed_m_s in landing_speeds_m_s(pilot.vehicle, pilot.pace.speed_m_s):
+        for a, b in pairwise(flared(pilot.at, end, flat_m(pilot.at, end), speed_m_s)):
+            pilot.instead(seq, "land", a, b, column=True)
     pilot.at = end
+
+
+def landing_speeds_m_s(vehicle: Vehicle, speed_m_s: float) -> list[float]:
+    """The speeds over ground from which a landing flares: in still air, the strongest wind ahead, and behind."""
+    wind_m_s = vehicle.wind_m_s
+    return sorted({speed_m_s, max(speed_m_s - wind_m_s, 1.0), speed_m_s + wind_m_s} if wind_m_s else {speed_m_s})
 
 
 def _downhill(pilot: Aboard, seq: int, end: Place) -> Note | None:

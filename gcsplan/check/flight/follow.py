@@ -31,7 +31,7 @@ from itertools import pairwise
 from gcsplan.check.fixed_wing.ends import REACHED_M, circle_up, climb_out, glide, is_wing, turns_early
 from gcsplan.check.flight.arc_waypoint import fly_arc
 from gcsplan.check.flight.route import fly_all
-from gcsplan.check.motion.circles import PLANE_LOITER_RADIUS_M, circle_growth, circle_widened
+from gcsplan.check.motion.circles import PLANE_LOITER_RADIUS_M, circle_reach_m, circle_widened
 from gcsplan.check.motion.commands import flown_otherwise, moves_nothing, why_lost
 from gcsplan.check.motion.flight_state import Aboard
 from gcsplan.check.motion.return_rules import RETURN_RULES, returned
@@ -257,7 +257,7 @@ class _Pilot(Aboard):
         hold_s = self.turns_s(item, reach_m) if turns else self.loiter_s(item)
         if plane:
             self.note(circle_widened(seq, reach_m, self.at[2]))
-            reach_m *= circle_growth(self.at[2])
+            reach_m = self._circles_m(reach_m, self.at[2])
         self.add(seq, "loiter", self.at, self.at, reach_m=reach_m, hold_s=hold_s, turns=turns)
         self.direction = None
 
@@ -272,6 +272,10 @@ class _Pilot(Aboard):
         )
         self.note(Note("circle_by_default", seq, parameter=parameter, radius_m=default_m))
         return max(default_m, self.circle_m, self.vehicle.turn_radius_m)
+
+    def _circles_m(self, radius_m: float, amsl_m: float) -> float:
+        """How far from its middle a plane's circle reaches."""
+        return circle_reach_m(radius_m, amsl_m, self.vehicle.speed_max_m_s, self.vehicle.wind_m_s)
 
     def _change_altitude(self, seq: int, item: MissionItem) -> None:
         """LOITER_TO_ALT: to the place, then up or down there; a plane circles while it does."""
@@ -289,7 +293,7 @@ class _Pilot(Aboard):
         if plane:
             around = (*place, 0.5 * (low + high))
             self.note(circle_widened(seq, reach_m, high))
-            reach_m *= circle_growth(high)
+            reach_m = self._circles_m(reach_m, high)
             self.add(seq, "loiter", around, around, band_m=0.5 * (high - low), reach_m=reach_m)
             self.low_m, self.around_m = min(REACHED_M, self.at[2] - low), reach_m
         elif self.autopilot is Autopilot.PX4 and before[2] != self.at[2]:  # level first, then up or down there

@@ -178,7 +178,12 @@ class FlightInWind:
         fastest = np.zeros(count)
         np.maximum.at(fastest, stretch, self._ability.most_air_m_s)
         wind_m_s = self._places(self.wind).strongest_m_s(cells)
-        return Costs(air_m + later_s * fastest, moving_s + later_s, self._held_s[1], wind_m_s)
+        # Where it speeds up, brakes and turns, it is slower than the wind allows: the wind blows past for longer.
+        even = [np.bincount(stretch, weights=self._run_m / g, minlength=count) for g in (slow, self._ability.most_m_s)]
+        uneven_s = np.maximum(moving_s - even[0], self._still_s - even[1]) + self._uneven_s
+        blown_m = np.maximum(uneven_s, 0.0) * (0.0 if self.vehicle.keeps_airspeed else wind_m_s)
+        blown_m += self._gust_air_m(moving_s)
+        return Costs(air_m + blown_m + later_s * fastest, moving_s + later_s, self._held_s[1], wind_m_s)
 
     @cached_property
     def _held_s(self) -> tuple[Floats, Floats]:
@@ -276,6 +281,19 @@ class FlightInWind:
         moved_m = add_m_s * tau * np.sqrt(2.0 * np.maximum(drifts - 1.0 + np.exp(-drifts), 0.0))
         early_s = np.maximum.accumulate(per_m_s) * moved_m
         return early_s + np.cumsum(np.diff(latest_s, prepend=0.0) * per_m_s * lost_m_s), early_s
+
+    def _gust_air_m(self, seconds: Floats) -> Floats:
+        """(N,) metres that gusts add to a multicopter's way through the air: how far they may carry it on the whole,
+        and those across, which count by half of their square per airspeed. A fixed wing keeps its airspeed."""
+        add_m_s = self.wind.gusts_add_m_s
+        if not add_m_s or self.vehicle.keeps_airspeed or not len(self._run_m):
+            return np.zeros(len(seconds))
+        sigma = add_m_s / GUST_SIGMAS
+        air = max(float(self._ability.most_m_s.min()) - self.wind.most_m_s, sigma)
+        tau = gust_length_m(float(self._agl_m[:, 1].max())) / air
+        drifts = np.cumsum(seconds) / tau
+        moved_m = add_m_s * tau * np.sqrt(2.0 * np.maximum(drifts - 1.0 + np.exp(-drifts), 0.0))
+        return np.asarray(np.diff(moved_m, prepend=0.0) + seconds * 0.5 * sigma**2 / air)
 
     def _cannot(self, wind: DeclaredWind) -> tuple[int, Floats] | None:
         """A stretch that cannot be flown in a wind of the set, and that wind (2,); None if there is none."""

@@ -72,34 +72,66 @@ def late_m(turn_rad: float, speed_m_s: float, tuning: Tuning = DEFAULTS) -> floa
     return LATE_S * tuning.l1_slower * speed_m_s * min(1.0, LATE_PER_SINE * math.sin(turn))
 
 
-def tracking_m(radius_m: float, turn_rad: float, speed_m_s: float, tuning: Tuning = DEFAULTS) -> float:
-    """How far from its arc a turn that begins at the tangent length is flown in calm air, m; 0 at speed 0."""
+def tracking_m(
+    radius_m: float, turn_rad: float, speed_m_s: float, tuning: Tuning = DEFAULTS, wind_m_s: float = 0.0
+) -> float:
+    """How far from its arc a turn that begins at the tangent length is flown, m; 0 at speed 0.
+
+    ``wind_m_s``: in the worst of all winds up to this; 0: calm air.
+    """
     if not speed_m_s > 0.0:
         return 0.0
     turn = min(math.radians(math.ceil(math.degrees(abs(turn_rad)) - 1e-6)), math.radians(170.0))
     speed = max(round(speed_m_s, 1), SLOWEST_M_S)
-    return max(late_m(turn_rad, speed_m_s, tuning), l1_off_m(radius_m, turn, speed, tuning))
+    late = late_m(turn_rad, speed_m_s + wind_m_s, tuning)
+    blows = [(0.0, 0.0), *winds_around(math.ceil(10.0 * wind_m_s) / 10.0, speed)]
+    return max(late, *(l1_off_m(radius_m, turn, speed, tuning, wind) for wind in blows))
+
+
+WINDS_AROUND, LEAST_HEADWAY = 8, 0.1
+"""Directions of the winds in which a turn is simulated; and the part of the airspeed that a wind must leave."""
+
+
+def winds_around(wind_m_s: float, speed_m_s: float) -> list[tuple[float, float]]:
+    """Winds of a speed from all around, along and across a leg; none in calm air.
+
+    A wind that leaves less than `LEAST_HEADWAY` of the airspeed counts as one that leaves so much: no mission passes
+    in it.
+    """
+    blows_m_s = min(wind_m_s, (1.0 - LEAST_HEADWAY) * speed_m_s)
+    turns = [2.0 * math.pi * k / WINDS_AROUND for k in range(WINDS_AROUND)] if blows_m_s > 0.0 else []
+    return [(blows_m_s * math.cos(turn), blows_m_s * math.sin(turn)) for turn in turns]
 
 
 @lru_cache(maxsize=4096)
-def l1_off_m(radius_m: float, turn_rad: float, speed_m_s: float, tuning: Tuning = DEFAULTS) -> float:
-    """The largest distance from the arc under the L1 law, m, for a turn to the left between long legs."""
+def l1_off_m(
+    radius_m: float, turn_rad: float, speed_m_s: float, tuning: Tuning = DEFAULTS,
+    wind_m_s: tuple[float, float] = (0.0, 0.0),
+) -> float:  # fmt: skip
+    """The largest distance from the arc under the L1 law, m, for a turn to the left between long legs.
+
+    ``wind_m_s``: along the first leg, and to its left. The law steers the velocity over ground, by banking.
+    """
     tangent = radius_m * math.tan(0.5 * turn_rad)
-    ahead = tuning.l1_ahead_m(speed_m_s)
-    gain = 4.0 * tuning.l1_damping**2 * speed_m_s**2 / ahead
     cos, sin = math.cos(turn_rad), math.sin(turn_rad)
-    x, y, heading, bank, worst = -tangent, 0.0, 0.0, 0.0, 0.0  # the corner is the origin, the first leg the x axis
-    steps = math.ceil((2.0 * tangent / speed_m_s + CALM_S * tuning.l1_slower) / STEP_S)
+    x, y, bank, worst = -tangent, 0.0, 0.0, 0.0  # the corner is the origin, the first leg the x axis
+    heading = -math.asin(wind_m_s[1] / speed_m_s)
+    slowest = speed_m_s - math.hypot(*wind_m_s)
+    steps = math.ceil((2.0 * tangent / slowest + CALM_S * tuning.l1_slower) / STEP_S)
     most = math.radians(min(tuning.roll_deg, MOST_BANK_DEG))
     for _ in range(steps):
+        over_x, over_y = speed_m_s * math.cos(heading) + wind_m_s[0], speed_m_s * math.sin(heading) + wind_m_s[1]
+        over_ground = math.hypot(over_x, over_y)
+        ahead = tuning.l1_ahead_m(over_ground)
+        gain = 4.0 * tuning.l1_damping**2 * over_ground**2 / ahead
         aside = cos * y - sin * x  # left of the new leg
         closing = math.asin(min(max(-aside / ahead, -CAPTURE_SINE), CAPTURE_SINE))
-        turn_to_fly = closing + (turn_rad - heading + math.pi) % (2.0 * math.pi) - math.pi
+        turn_to_fly = closing + (turn_rad - math.atan2(over_y, over_x) + math.pi) % (2.0 * math.pi) - math.pi
         push = gain * math.sin(min(max(turn_to_fly, -0.5 * math.pi), 0.5 * math.pi))
         bank += (min(max(math.atan(push / GRAVITY_M_S2), -most), most) - bank) * STEP_S / BANK_S
         heading += GRAVITY_M_S2 * math.tan(bank) / speed_m_s * STEP_S
-        x += speed_m_s * math.cos(heading) * STEP_S
-        y += speed_m_s * math.sin(heading) * STEP_S
+        x += over_x * STEP_S
+        y += over_y * STEP_S
         off = min(
             math.hypot(max(x + tangent, 0.0), y),
             math.hypot(max(tangent - cos * x - sin * y, 0.0), cos * y - sin * x),
@@ -107,4 +139,50 @@ def l1_off_m(radius_m: float, turn_rad: float, speed_m_s: float, tuning: Tuning 
         if math.atan2(x + tangent, radius_m - y) % (2.0 * math.pi) <= turn_rad:
             off = min(off, abs(math.hypot(x + tangent, y - radius_m) - radius_m))
         worst = max(worst, off)
+    return worst
+
+
+LAPS = 3
+
+
+def circle_reach_m(radius_m: float, amsl_m: float, speed_m_s: float, wind_m_s: float) -> float:
+    """How far from its middle a circle of ``radius_m`` reaches at an altitude, m, in all winds up to ``wind_m_s``.
+
+    ``speed_m_s`` is the indicated airspeed.
+    """
+    flown_m, true = radius_m * circle_growth(amsl_m), speed_m_s * math.sqrt(circle_growth(amsl_m))
+    return flown_m + circle_off_m(math.ceil(flown_m), math.ceil(true), math.ceil(10.0 * wind_m_s) / 10.0)
+
+
+@lru_cache(maxsize=1024)
+def circle_off_m(radius_m: float, speed_m_s: float, wind_m_s: float, tuning: Tuning = DEFAULTS) -> float:
+    """How far outside its circle ArduPlane gets in a wind under the L1 law, m, once it is on it; 0 in calm air.
+
+    Source: AP_L1_Control.cpp, `update_loiter`, anticlockwise from a place east of the middle.
+    """
+    winds = winds_around(wind_m_s, speed_m_s)
+    if not winds:
+        return 0.0
+    worst, omega = 0.0, 2.0 * math.pi / tuning.l1_period_s
+    most = math.radians(min(tuning.roll_deg, MOST_BANK_DEG))
+    east, north = winds[0]  # the circle is the same in every direction
+    x, y, heading, bank = radius_m, 0.0, 0.5 * math.pi + math.asin(min(east / speed_m_s, 1.0)), 0.0
+    slowest = speed_m_s - math.hypot(east, north)
+    for _ in range(math.ceil(LAPS * 2.0 * math.pi * radius_m / slowest / STEP_S)):
+        over_x, over_y = speed_m_s * math.cos(heading) + east, speed_m_s * math.sin(heading) + north
+        over_ground, away = math.hypot(over_x, over_y), math.hypot(x, y)
+        out, around = (x * over_x + y * over_y) / away, (x * over_y - y * over_x) / away
+        captures = min(max(math.atan2(around, -out), -0.5 * math.pi), 0.5 * math.pi)
+        gain = 4.0 * tuning.l1_damping**2 * over_ground**2 / tuning.l1_ahead_m(over_ground)
+        capture = gain * math.sin(captures)
+        off = away - radius_m
+        steers = off * omega**2 + out * 2.0 * tuning.l1_damping * omega
+        if out > 0.0 and around < 0.0:
+            steers = max(steers, 0.0)
+        circle = steers + around**2 / max(0.5 * radius_m, radius_m + off)
+        push = capture if off > 0.0 and capture < circle else circle
+        bank += (min(max(math.atan(push / GRAVITY_M_S2), -most), most) - bank) * STEP_S / BANK_S
+        heading += GRAVITY_M_S2 * math.tan(bank) / speed_m_s * STEP_S
+        x, y = x + over_x * STEP_S, y + over_y * STEP_S
+        worst = max(worst, math.hypot(x, y) - radius_m)
     return worst

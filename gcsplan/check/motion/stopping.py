@@ -106,7 +106,7 @@ def about_turn_m(vehicle: Vehicle, speed_m_s: float, amsl_m: float, home_m: floa
     least = 2.0 * max(vehicle.limits.track_error_m, vehicle.turn_radius_m)
     if vehicle.autopilot is not Autopilot.ARDUPLANE:
         return least
-    speed = speed_m_s * math.sqrt(circle_growth(amsl_m))
+    speed = speed_m_s * math.sqrt(circle_growth(amsl_m)) + vehicle.wind_m_s
     fade_s = DEFAULTS.l1_ahead_m(1.0) / (4.0 * DEFAULTS.l1_damping**2)
     turn_m = speed**2 / min(GRAVITY_M_S2, speed / fade_s) + 0.5 * math.pi * fade_s * speed
     spare = ABOUT_SPARE_NEAR if home_m < 2.0 * turn_m else ABOUT_SPARE
@@ -115,7 +115,7 @@ def about_turn_m(vehicle: Vehicle, speed_m_s: float, amsl_m: float, home_m: floa
 
 def circle_home_m(radius_m: float, vehicle: Vehicle, amsl_m: float) -> float:
     """How far from home a plane's circle of ``radius_m`` reaches, m."""
-    speed = vehicle.speed_max_m_s * math.sqrt(circle_growth(amsl_m))
+    speed = vehicle.speed_max_m_s * math.sqrt(circle_growth(amsl_m)) + vehicle.wind_m_s
     return max(radius_m, CIRCLE_SPARE * speed**2 / GRAVITY_M_S2) + CIRCLE_LATE_S * speed
 
 

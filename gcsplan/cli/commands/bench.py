@@ -120,6 +120,29 @@ def bench_fleet(
     _tell(result, bench.report, as_json)
 
 
+@bench_app.command("wind", short_help="Flights in declared winds, beside their windows.")
+def bench_wind(
+    flights: Annotated[int, typer.Option(metavar="N", help="Rehearsed flights in declared winds.")] = 1000,
+    beyond: Annotated[int, typer.Option(metavar="N", help="Flights in winds beyond the declared ones.")] = 200,
+    seed: Annotated[int, typer.Option(metavar="N", help="Seed of missions and winds.")] = 1,
+    quick: QuickOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Plan and rehearse copters and wings in constant winds, ranges, profiles, and winds that vary, with gusts.
+
+    Count the arrivals inside the windows, and the flights that take more energy than is planned. The exit code is 4 if
+    there is one outside or above.
+    """
+    from gcsplan.bench import wind as bench
+    from gcsplan.cli.output.console import remark
+
+    result = bench.run(
+        min(flights, 40) if quick else flights, min(beyond, 20) if quick else beyond, seed=seed, tell=remark
+    )
+    _tell(result, bench.report, as_json)
+    raise typer.Exit(4 if result["faults"] else 0)
+
+
 @bench_app.command("functions", short_help="SSGWO's nine functions.")
 def bench_functions(
     runs: Annotated[int, typer.Option(metavar="N", help="Runs of each (paper: 50).")] = 50,

@@ -34,7 +34,12 @@ if TYPE_CHECKING:
 def rehearse(
     mission: MissionArgument,
     planner: PlannerOption = None,
-    wind: Annotated[float, typer.Option(metavar="M_S", help="A steady wind.")] = 0.0,
+    wind: Annotated[
+        float | None,
+        typer.Option(
+            metavar="M_S", help="A steady wind [default: each run draws one of the mission's winds, else still air]"
+        ),
+    ] = None,
     wind_from: Annotated[
         float | None,
         typer.Option(metavar="DEG", help="Where it blows from [default: another direction in each run]"),
@@ -109,9 +114,7 @@ def rehearse(
     from gcsplan.cli.output.verdict_table import say_homes
     from gcsplan.export.outdir import write_whole
     from gcsplan.notes.note import Wording
-    from gcsplan.sim.flight.wind import Weather
 
-    weather = Weather(wind, wind_from, gusts, noise_m)
     if airspeed is not None and not airspeed > 0.0:
         raise UsageError(f"--airspeed {airspeed:g}: give a speed above 0")
     require_html(report)
@@ -123,6 +126,7 @@ def rehearse(
     if in_sitl and params:
         raise UsageError("--params is the built-in simulator's: an SITL has parameters of its own")
     source = pipeline.load_mission(mission, at=at)
+    weather = rehearsing.weather_of(source, wind, wind_from, gusts, noise_m)
     names = [r.vehicle.name for r in source.vehicles]
     addresses = rehearsing.seats_of(sitl or [], names)
     with planning_display(names, source.planner.objective) as progress:
@@ -191,6 +195,9 @@ def _ending(result: Rehearsal, units: Units) -> list[str]:
         lines.append(least)
     if result.runs > 1 and result.p95_s is not None:
         lines.append(f"95 % of all arrivals lie within {result.p95_s:.2f} s of the plan")
+    if result.inside_windows is not None:
+        inside, arrivals = result.inside_windows
+        lines.append(f"{inside} of {arrivals} {'arrivals lie' if arrivals > 1 else 'arrival lies'} inside the window")
     lines += [f"violation: {in_units(b.note(result.runs), units)}" for b in result.breaches]
     lines += [f"not flown: {in_units(what, units)}" for what in result.not_judged]
     lines.append(

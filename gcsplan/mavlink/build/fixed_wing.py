@@ -41,7 +41,7 @@ LEAST_ACCEPTED_M = 1.0
 
 def pitch_deg(vehicle: Vehicle) -> int:
     """Return the take-off pitch: whole degrees, at most ``max_climb_deg``."""
-    return math.floor(vehicle.limits.max_climb_deg + 1e-9)
+    return math.floor(vehicle.steepest_in_air_deg + 1e-9)
 
 
 def parted(points: Floats, radius_m: float) -> Floats:

@@ -8,8 +8,8 @@ the heading is far off the direction of the path. The turns at the joints are co
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
 from itertools import count, islice, pairwise
 from typing import Protocol, TypeVar
 
@@ -83,7 +83,8 @@ class EndJudge(Protocol):
 class RequiredEnd:
     """The required end: at ``ground`` (3,), with a slant as steep as ``slope``, to at least ``agl_m`` above it.
 
-    ``heading``: the only one, radians from east to north, seen outwards; None for any.
+    ``heading``: the only one, radians from east to north, seen outwards; None for any. ``rank``: a heading of a lower
+    rank is tried before others; of the same rank, the one nearer to the direction of the path.
     """
 
     ground: Floats
@@ -91,6 +92,7 @@ class RequiredEnd:
     agl_m: float | None
     heading: float | None
     judge: EndJudge
+    rank: Callable[[float], float] = field(default=lambda heading: 0.0)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -124,20 +126,20 @@ def straight_ends(problem: Problem, required: RequiredEnd, sharp: Floats) -> Ite
     ground, radius = required.ground, problem.turn_radius_m
     run_m = radius * math.tan(0.5 * SHARPEST_RAD) + 20.0
     aim = _along(sharp, (float(sharp[0, 2]) - float(ground[2])) / required.slope + run_m + 2.0 * radius)
-    for heading in _headings(ground, aim, required.heading):
+    for heading in _headings(ground, aim, required):
         end = _end(problem, required, heading, aim, run_m)
         if end is not None:
             yield end
 
 
-def _headings(ground: Floats, aim: Floats, given: float | None) -> list[float]:
-    """The requested heading alone; otherwise all headings, the nearest to the direction of ``aim`` first."""
-    if given is not None:
-        return [given]
+def _headings(ground: Floats, aim: Floats, required: RequiredEnd) -> list[float]:
+    """The requested heading alone; otherwise all by their rank, and the nearest to the direction of ``aim`` first."""
+    if required.heading is not None:
+        return [required.heading]
     natural = math.atan2(aim[1] - ground[1], aim[0] - ground[0])
     steps = range(1, round(180.0 / STEP_DEG))
     turns = [0.0, *(side * math.radians(STEP_DEG) * i for i in steps for side in (1.0, -1.0)), math.pi]
-    return [natural + turn for turn in turns]
+    return sorted((natural + turn for turn in turns), key=required.rank)
 
 
 def _end(problem: Problem, required: RequiredEnd, heading: float, aim: Floats, run_m: float) -> FlightEnd | None:
@@ -182,7 +184,7 @@ def circling_ends(problem: Problem, required: RequiredEnd, sharp: Floats) -> Ite
     air, limits, radius = problem.airspace, problem.limits, around_m(problem)
     ground, aim = required.ground, _along(sharp, 6.0 * radius)
     least = float(ground[2]) + max(required.agl_m or 0.0, limits.min_agl_m)
-    for one in _headings(ground, aim, required.heading):
+    for one in _headings(ground, aim, required):
         way = np.array([math.cos(one), math.sin(one)])
         for low_m in CIRCLES_FROM_M:
             top = np.array([*(ground[:2] + low_m / required.slope * way), ground[2] + low_m])

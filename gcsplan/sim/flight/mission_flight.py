@@ -178,11 +178,11 @@ def fly(
     """
     weather = weather or Weather()
     ways = _Ways(tracks)
-    air = Air(weather, len(tracks), runs, seed, first_run)
+    air = Air(weather, tracks, runs, seed, first_run)
     lanes = _Lanes(tracks, ways, np.tile(np.asarray(depart_s, dtype=np.float64), runs), runs)
     latest_s = max(depart_s) + PATIENCE * ways.calm_s() + PATIENCE_SPARE_S
     times, along, offset = [0.0], [lanes.s.copy()], [air.offset]
-    step = 0
+    step, through_m = 0, np.zeros(len(lanes.s))
     while not lanes.done.all() and step * FLIGHT_STEP_S < latest_s:
         step += 1
         lanes.advance(step * FLIGHT_STEP_S, None if weather.calm else air.wind)
@@ -190,7 +190,9 @@ def fly(
             times.append(step * FLIGHT_STEP_S)
             along.append(lanes.s.copy())
             if not weather.calm:
-                air.step(SAMPLE_S)
+                came_m = lanes.air + lanes.held_air
+                air.step(SAMPLE_S, step * FLIGHT_STEP_S, lanes.s, (came_m - through_m) / SAMPLE_S)
+                through_m = came_m
                 offset.append(air.offset)
     if step % SAMPLE_STEPS:
         times.append(step * FLIGHT_STEP_S)
@@ -345,11 +347,15 @@ class _Lanes:
         course = self._ways.course[k]
         tail = (course * wind).sum(axis=1)
         cross = course[:, 0] * wind[:, 1] - course[:, 1] * wind[:, 0]
+        # A vehicle that keeps its airspeed has it along its slope.
+        flat = np.where(self._keeps, self._ways.flat[k], 1.0)
+        aside = cross**2 + (1.0 - flat**2) * tail**2
+        tail = tail * flat
         level, slope = self._ways.airspeed[k].T
         most = level
         for _ in range(2):  # through the air its slope is less steep in a headwind, and steeper in a tailwind
             in_air = np.where(self._keeps, np.minimum(self.command, most), most)
-            through = np.sqrt(np.maximum(in_air**2 - cross**2, 0.0))
+            through = np.sqrt(np.maximum(in_air**2 - aside, 0.0))
             headway = np.maximum(tail + through, HEADWAY_M_S)
             with np.errstate(invalid="ignore"):  # an airspeed without a bound
                 most = np.where(np.isinf(level), level, level + (slope - level) * np.minimum(headway / most, 1.5))

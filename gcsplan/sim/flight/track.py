@@ -27,6 +27,8 @@ from gcsplan.world.world import World
 
 TERRAIN_PART_M = 10.0
 """Longest piece of a leg that follows the terrain, in metres."""
+GROUND_STEP_M = 30.0
+"""Metres along a track between the places whose ground tells the height of the air around the vehicle."""
 PX4_TAKE_OFF_M_S = 1.5
 """m/s: PX4's speed in the first metres of a take-off (MPC_TKO_SPEED)."""
 SCALING_M_PER_DEGREE = 0.011131884502145034 * 1e7
@@ -43,8 +45,9 @@ class CommandedTrack:
     it does not stop, infinite if it stays. Of the pieces (N - 1,): ``cap_m_s``, the highest speed along it that climb,
     descent and corners allow; ``command_m_s``, the commanded speed over ground; ``level``, the horizontal fraction of
     its length; ``accel_m_s2``; ``airspeed_m_s`` (N - 1, 2), the highest level and on its slope; ``column`` (take-off or
-    landing); ``seq``, the wire item. ``goal``: the node at which the planned path ends. ``keeps_airspeed``: the
-    commanded speed is through the air, and wind adds to it.
+    landing); ``seq``, the wire item. ``ground`` (M, 2): metres along the track, and the ground below, m AMSL. ``goal``:
+    the node at which the planned path ends. ``keeps_airspeed``: the commanded speed is through the air, and wind adds
+    to it.
     """
 
     name: str
@@ -56,6 +59,7 @@ class CommandedTrack:
     accel_m_s2: Floats
     column: Bools
     seq: Indices
+    ground: Floats
     goal: int
     ends_in_air: bool
     slowing_m_s2: float
@@ -67,6 +71,12 @@ class CommandedTrack:
     def length_m(self) -> Floats:
         """(N - 1,) length of each piece in space."""
         return np.asarray(np.linalg.norm(np.diff(self.points, axis=0), axis=1))
+
+    def heights_m(self, along_m: Floats) -> tuple[Floats, Floats]:
+        """The heights above sea and above ground at ``along_m`` (K,), metres along the track."""
+        node_m = np.concatenate([[0.0], np.cumsum(self.length_m)])
+        amsl_m = np.interp(along_m, node_m, self.points[:, 2])
+        return amsl_m, amsl_m - np.interp(along_m, *self.ground.T)
 
     def slack_m(self, times_s: Floats, along_m: Floats) -> Floats:
         """(M - 1,) metres along the path by which the motion between two samples may deviate from uniform motion.
@@ -202,7 +212,7 @@ def make_track(
         i += 1
     if not line.pieces:
         raise ValueError(f"{vehicle.name}: the mission flies nowhere")
-    return _track(vehicle, line, goal, flight, kinematics, stretches[min(i, len(stretches) - 1)])
+    return _track(vehicle, line, goal, flight, kinematics, stretches[min(i, len(stretches) - 1)], world)
 
 
 def _home_amsl_m(mission: Mission, world: World) -> float:
@@ -212,7 +222,7 @@ def _home_amsl_m(mission: Mission, world: World) -> float:
 
 
 def _track(
-    vehicle: Vehicle, line: _Line, goal: int, flight: Flight, kinematics: Kinematics, last: Stretch
+    vehicle: Vehicle, line: _Line, goal: int, flight: Flight, kinematics: Kinematics, last: Stretch, world: World
 ) -> CommandedTrack:
     name, turns = vehicle.name, []
     if vehicle.turn_radius_m > 0.0 and vehicle.autopilot is not Autopilot.ARDUPLANE:
@@ -223,11 +233,21 @@ def _track(
         raise InputError(f"{name}: the mission follows terrain that the terrain model does not know")
     return CommandedTrack(
         name, points, np.array(line.hold_s), np.array(cap), np.array(command), np.array(level),
-        np.array(accel), np.array(column, dtype=np.bool_), np.array(seq, dtype=np.intp), goal,
+        np.array(accel), np.array(column, dtype=np.bool_), np.array(seq, dtype=np.intp), _ground(points, world), goal,
         not (last.column and last.end[2] < last.start[2]), kinematics.slowing_m_s2,
         _airspeeds(points, kinematics),
         (*flight.not_judged, *_left_out(flight), *turns), vehicle.keeps_airspeed,
     )  # fmt: skip
+
+
+def _ground(points: Floats, world: World) -> Floats:
+    """(M, 2) metres along a track, every `GROUND_STEP_M` and at its nodes, and the ground there; its own height where
+    that is unknown."""
+    node_m = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    at_m = np.union1d(node_m, np.linspace(0.0, node_m[-1], math.ceil(node_m[-1] / GROUND_STEP_M) + 1))
+    east_m, north_m, amsl_m = (np.interp(at_m, node_m, points[:, k]) for k in range(3))
+    ground_m = world.airspace.surface.high_at(east_m, north_m)
+    return np.column_stack([at_m, np.where(np.isnan(ground_m), amsl_m, ground_m)])
 
 
 def _airspeeds(points: Floats, kinematics: Kinematics) -> Floats:

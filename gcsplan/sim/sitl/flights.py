@@ -110,7 +110,7 @@ def rehearse_sitl(
     """Upload, arm, start, observe and judge one run.
 
     ``seats``: the URL of each vehicle's autopilot, by its name; ``report(vehicle, what)``: progress. ``weather``: its
-    wind and gusts are set in the simulators for the flight; ``seed``: of a direction that it does not say.
+    wind and gusts are set in the simulators for the flight, the same at every height; ``seed``: of what it draws.
 
     Raises UsageError for a vehicle without a URL, an autopilot that is not ArduPilot, and (unless ``i_know``) a link
     to another machine; VehicleRefused if a peer is no simulator, does not arm, or refuses its mission; LinkError if
@@ -132,7 +132,7 @@ def rehearse_sitl(
         found = _all([PumpJob(c, _ready(c, p, tell, i_know=i_know)) for c, p in zip(channels, parts, strict=True)])
         states: list[VehicleState] = [state for state, _ in found]
         upload_parts(parts, [channel.link for channel in channels])
-        weather = weather or Weather()
+        weather = (weather or Weather()).steady(seed)
         wind = wind_parameters(weather, seed)
         calm = _all([PumpJob(c, change_steps(c, s, wind)) for c, s in zip(channels, states, strict=True)])
         flights = [PumpJob(c, _fly(c, p, s, world, tell)) for c, p, s in zip(channels, parts, states, strict=True)]

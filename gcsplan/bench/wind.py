@@ -1,0 +1,184 @@
+"""Rehearsed flights in declared winds: arrivals inside the windows of the plan, and the planned energies.
+
+Missions of copters and fixed wings over flat ground, each with another wind of one of `WIND_KINDS`, are planned,
+uploaded to simulated vehicles and flown `RUNS` times each, in winds and gusts drawn from what they declare. Then
+missions are flown in winds beyond these: each such flight arrives inside its window all the same, or is named
+as a violation.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from gcsplan.app.fleet.pipeline import plan
+from gcsplan.app.plan.model import Plan
+from gcsplan.app.rehearse import rehearse, weather_of
+from gcsplan.errors import InputError, NoMission
+from gcsplan.mission_file import load_mission
+from gcsplan.sim.flight.wind import Weather
+from gcsplan.sim.outcome import Rehearsal
+
+RUNS = 20
+"""Flights of each mission."""
+WIND_KINDS = ("constant", "range", "up to", "levels", "constant, varying", "range, varying", "up to, varying")
+TIMES_STRONGER = 1.5, 2.0
+"""How many times stronger than the declared wind one beyond it blows."""
+MOST_FLIGHTS = 100_000
+MIDDLE_DEG = 36.6, -84.3
+BATTERY_J = 1e7
+ENERGY_SLACK = 1.002
+"""Simulated motion and planned motion take the same energy up to this factor in still air."""
+
+
+def run(
+    flights: int = 1000, beyond: int = 200, *, seed: int = 1, tell: Callable[[str], None] | None = None
+) -> dict[str, Any]:
+    """Fly; ``tell`` gets a line from time to time. Raises InputError for a number out of range."""
+    if not 1 <= flights <= MOST_FLIGHTS or not 0 <= beyond <= MOST_FLIGHTS:
+        raise InputError(f"give 1 to {MOST_FLIGHTS} flights and at most as many beyond, not {flights} and {beyond}")
+    rows: dict[str, Counter[str]] = {}
+    refused: Counter[str] = Counter()
+    faults: list[str] = []
+    outside: Counter[str] = Counter()
+    number = flown = blown = 0
+    while flown < flights:
+        number += 1
+        if number > 10 * flights + 100:
+            raise InputError(f"seed {seed}: too few missions can be planned")
+        kind, document = mission_of(seed, number)
+        planned = _planned(document, refused)
+        if planned is None:
+            continue
+        runs = min(RUNS, flights - flown)
+        result = rehearse(planned, weather=weather_of(planned.source, None, None, 0.0, 0.0), runs=runs, seed=number)
+        flown += runs
+        row = rows.setdefault(f"{document['vehicles'][0]['name']}, {kind}", Counter())
+        faults += _count(row, planned, result, runs, f"seed {seed}, mission {number} ({kind})")
+        if blown < beyond:
+            blown += _beyond(planned, outside, min(RUNS, beyond - blown), number, faults)
+        if tell is not None and number % 10 == 0:
+            tell(f"{flown} of {flights} flights, {len(faults)} faults")
+    return {
+        "flights": flown, "beyond": blown, "seed": seed, "missions": number, "refused": dict(refused),
+        "kinds": {kind: dict(row) for kind, row in sorted(rows.items())}, "beyond_flights": dict(outside),
+        "faults": faults,
+    }  # fmt: skip
+
+
+def _planned(document: dict[str, Any], refused: Counter[str]) -> Plan | None:
+    """The plan of a mission that passes; None, and why, of any other."""
+    try:
+        planned = plan(load_mission(document))
+    except NoMission as refusal:
+        refused[refusal.reason] += 1
+        return None
+    verdict = planned.vehicles[0].verdict
+    if verdict.safe is not True:
+        refused[verdict.findings[0].kind if verdict.findings else "not judged"] += 1
+        return None
+    return planned
+
+
+def _count(row: Counter[str], planned: Plan, result: Rehearsal, runs: int, named: str) -> list[str]:
+    """Add the flights of a mission to its kind's row; the faults."""
+    inside, _ = result.inside_windows or (0, 0)
+    row.update(missions=1, flights=runs, inside=inside)
+    faults = [f"{named}: {breach.note(runs)}" for breach in result.breaches if breach.kind in ("window", "arrival")]
+    if result.inside_windows is None:
+        faults.append(f"{named}: its plan has no window")
+    verdict, percent = planned.vehicles[0].verdict, result.vehicles[0].battery_used_percent
+    assert percent is not None
+    took_j = 0.01 * percent * BATTERY_J
+    if took_j > verdict.energy_j * ENERGY_SLACK:
+        row["over_energy"] += 1
+        faults.append(f"{named}: took {took_j / 1e3:.1f} kJ, planned are {verdict.energy_j / 1e3:.1f}")
+    return faults
+
+
+def _beyond(planned: Plan, outside: Counter[str], runs: int, seed: int, faults: list[str]) -> int:
+    """Fly a mission in a wind beyond what it declares; how many flights."""
+    wind = planned.source.wind
+    times = TIMES_STRONGER[seed % len(TIMES_STRONGER)]
+    result = rehearse(planned, weather=Weather(times * wind.most_m_s + 1.0), runs=runs, seed=seed)
+    inside, _ = result.inside_windows or (0, 0)
+    named = max((b.runs for b in result.breaches if b.kind == "window"), default=0)
+    never = max((b.runs for b in result.breaches if b.kind == "arrival"), default=0)
+    outside.update(inside=inside, named=named, never=never)
+    if inside + named + never != runs:
+        faults.append(f"mission {seed}: {runs} flights beyond its winds, {inside} inside, {named + never} named")
+    return runs
+
+
+def mission_of(seed: int, number: int) -> tuple[str, dict[str, Any]]:
+    """The kind of the wind, and a mission file as read from YAML."""
+    rng = np.random.default_rng([seed, number])
+    kind = WIND_KINDS[number % len(WIND_KINDS)]
+    wing = bool(rng.random() < 0.5)
+    speed = round(float(rng.uniform(16.0, 24.0) if wing else rng.uniform(5.0, 10.0)), 1)
+    most = round(float(rng.uniform(1.0, 0.35 * speed if wing else 6.0)), 1)
+    turn, away_m = float(rng.uniform(0.0, 2.0 * math.pi)), float(rng.uniform(2000.0, 4500.0))
+    goal = (
+        round(MIDDLE_DEG[0] + away_m * math.sin(turn) / 111_000.0, 6),
+        round(MIDDLE_DEG[1] + away_m * math.cos(turn) / 89_000.0, 6),
+    )
+    between = [round(0.5 * (a + b), 6) for a, b in zip(MIDDLE_DEG, goal, strict=True)]
+    vehicle: dict[str, Any] = {
+        "name": "wing" if wing else "copter", "sysid": 1, "autopilot": "arduplane" if wing else "arducopter",
+        "start": list(MIDDLE_DEG), "goal": list(goal), "speed_m_s": [speed, speed],
+        "energy": {"battery_j": BATTERY_J, "reserve": 0.1, "horizontal_j_per_m": 100, "vertical_j_per_m": 120},
+    }  # fmt: skip
+    vehicle |= {"turn_radius_m": math.ceil(speed**2 / 3.0), "end": "loiter"} if wing else {"lean_angle_deg": 45}
+    document: dict[str, Any] = {
+        "version": 1, "name": f"wind {number}", "terrain": {"flat_m": 300},
+        "limits": {"min_agl_m": 60, "track_error_m": 10, "altitude_error_m": 8},
+        "wind": _wind(rng, kind, most), "vehicles": [vehicle],
+        "no_fly": [{"name": "between", "center": between, "radius_m": round(float(rng.uniform(100.0, 400.0)))}],
+    }  # fmt: skip
+    return kind, document
+
+
+def _wind(rng: np.random.Generator, kind: str, most_m_s: float) -> dict[str, Any]:
+    """The keys of a wind of one of `WIND_KINDS`, with gusts in every second one."""
+    first = round(float(rng.uniform(0.0, 359.0)))
+    form, *varying = kind.split(", ")
+    if form == "up to":
+        wind: dict[str, Any] = {"up_to_m_s": most_m_s}
+    elif form == "levels":
+        low = round(float(rng.uniform(0.0, most_m_s)), 1)
+        wind = {"levels": [{"agl_m": 10, "speed_m_s": low, "from_deg": first},
+                           {"agl_m": 120, "speed_m_s": most_m_s, "from_deg": (first + 40) % 360}]}  # fmt: skip
+    else:
+        ranges = form == "range"
+        wind = {
+            "speed_m_s": [round(0.5 * most_m_s, 1), most_m_s] if ranges else most_m_s,
+            "from_deg": [first, (first + 60) % 360] if ranges else first,
+        }
+    gusts = {"gust_m_s": round(most_m_s + float(rng.uniform(0.5, 3.0)), 1)} if rng.random() < 0.5 else {}
+    return wind | gusts | ({"varying": True} if varying else {})
+
+
+def report(result: dict[str, Any]) -> str:
+    """The result in words."""
+    inside = sum(row["inside"] for row in result["kinds"].values())
+    refused = ", ".join(f"{count} {why}" for why, count in result["refused"].items()) or "none"
+    lines = [
+        f"{result['flights']} flights of {result['missions']} missions in declared winds, {inside} inside their "
+        f"windows; missions refused: {refused}",
+        "kind                            missions  flights  inside  over the plan's energy",
+    ]
+    lines += [
+        f"{kind:<32}{row['missions']:>8}{row['flights']:>9}{row['inside']:>8}{row.get('over_energy', 0):>22}"
+        for kind, row in result["kinds"].items()
+    ]
+    if beyond := result["beyond_flights"]:
+        lines.append(
+            f"{result['beyond']} flights beyond the declared winds: {beyond['inside']} inside all the same, "
+            f"{beyond['named']} named as outside, {beyond['never']} named as never arriving"
+        )
+    lines += [f"fault: {fault}" for fault in result["faults"][:20]]
+    return "\n".join(lines)

@@ -1,0 +1,30 @@
+"""The bench of flights in declared winds at its smallest."""
+
+from __future__ import annotations
+
+import pytest
+
+from gcsplan.bench import wind
+from gcsplan.errors import InputError
+
+
+@pytest.mark.slow
+def test_flights_in_declared_winds_are_counted_and_ones_beyond_are_named() -> None:
+    result = wind.run(flights=4, beyond=2)
+    assert result["flights"] == 4
+    assert result["faults"] == []
+    assert sum(row["inside"] for row in result["kinds"].values()) == 4
+    assert sum(result["beyond_flights"].values()) == 2
+    assert "4 inside their windows" in wind.report(result)
+
+
+def test_missions_are_of_every_kind_and_the_same_for_a_seed() -> None:
+    made = [wind.mission_of(1, number) for number in range(40)]
+    assert {kind for kind, _ in made} == set(wind.WIND_KINDS)
+    assert {document["vehicles"][0]["name"] for _, document in made} == {"copter", "wing"}
+    assert made[7] == wind.mission_of(1, 7)
+
+
+def test_a_number_out_of_range_is_refused() -> None:
+    with pytest.raises(InputError, match="100000 flights"):
+        wind.run(flights=0)
