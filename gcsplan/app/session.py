@@ -275,8 +275,8 @@ def _changed(content: Content, changes: Mapping[str, object]) -> Content:
 
 
 def _with_keys(content: Content, keys: Mapping[str, object], touched: Collection[str] | None = None) -> Content:
-    """The content with these keys alone. The sections in ``touched`` (None: all) may have arrays, GeoJSON and tuples, as
-    any mapping."""
+    """The content with these keys alone. The sections in ``touched`` (None: all) may have arrays, GeoJSON and
+    tuples, as any mapping."""
     held = dict(content.held)
     new = {section: value for section, value in keys.items() if touched is None or section in touched}
     given = dict(keys) | read_content(new, None, held=held)[2]

@@ -8,7 +8,7 @@ track and altitude errors and by the bow between the line straight in the plane 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -111,16 +111,9 @@ def judge(
         report = steep_report(plane, world.airspace.examine(plane.legs, vehicle.limits), vehicle.limits)
         findings = _worst(findings, _findings(others, plane, report, vehicle.limits, world))
     flight.notes += _unlike_fitted(flight.stretches, vehicle)
-    if needs_straight(mission.items, mission.autopilot):
-        flight.notes.append(Note("straight_legs_until"))
     if any(s.terrain for s in flight.stretches):
         flight.notes.append(Note("reads_terrain_on_board", spacing_m=world.post_spacing_m, error_m=terrain_error_m))
-    if costs is not None:
-        flight.notes.append(Note("judged_in_wind"))
-    if vehicle.energy.papers:
-        flight.notes.append(Note("paper_energy"))
-    if vehicle.limits.max_agl_m is None:
-        flight.notes.append(Note("no_ceiling"))
+    flight.notes += _terms(mission, vehicle, in_wind=costs is not None)
     verdict = Verdict(
         mission, figures, tuple(findings), tuple(flight.not_judged), tuple(flight.notes), misses=near, zone_pass=over,
         energy_stated=vehicle.energy.stated, paper_energy=vehicle.energy.papers,
@@ -128,6 +121,18 @@ def judge(
         in_wind=None if blown is None else JudgedWind(blown.flies_in, blown.window if costs else None),
     )  # fmt: skip
     return _with_battery(verdict, vehicle, flight, costs)
+
+
+def _terms(mission: Mission, vehicle: Vehicle, *, in_wind: bool) -> Iterator[Note]:
+    """The terms on which the verdict stands."""
+    if needs_straight(mission.items, mission.autopilot):
+        yield Note("straight_legs_until")
+    if in_wind:
+        yield Note("judged_in_wind")
+    if vehicle.energy.papers:
+        yield Note("paper_energy")
+    if vehicle.limits.max_agl_m is None:
+        yield Note("no_ceiling")
 
 
 def _agl_m(plane: PlaneLegs, report: LegReport, count: int) -> Floats:
@@ -148,8 +153,8 @@ def _blown_away(blown: FlightInWind | None) -> list[Finding]:
         "wind_too_strong", s.seq, way=s.kind, wind_m_s=bad.speed_m_s, from_deg=bad.from_deg,
         gusts=gusts_note(wind), up_to_m_s=bad.up_to_m_s,
     )  # fmt: skip
-    by_m_s = wind.most_m_s - bad.up_to_m_s
-    return [Finding(s.seq, "wind", note, lat, lon, amsl, wind.most_m_s, bad.up_to_m_s, by_m_s, "m/s")]
+    by_m_s = wind.strongest_m_s - bad.up_to_m_s
+    return [Finding(s.seq, "wind", note, lat, lon, amsl, wind.strongest_m_s, bad.up_to_m_s, by_m_s, "m/s")]
 
 
 def _unlike_fitted(stretches: Sequence[Stretch], vehicle: Vehicle) -> list[Note]:

@@ -1,5 +1,4 @@
-"""Sentences on what the check finds, does not judge and notes: items, turns, findings, energy; and the way home.
-"""
+"""Sentences on what the check finds, does not judge and notes: items, turns, findings, energy; and the way home."""
 
 CHECK_TEXTS = {
     # -- the difference to an earlier mission of the same vehicle --

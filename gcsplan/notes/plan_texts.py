@@ -106,8 +106,8 @@ PLAN_TEXTS = {
         "energies are those of the worst wind on each leg, and paths and corners are judged as in still air"
     ),
     "wind_too_strong": (
-        "in a wind of {wind_m_s:speed.1} from {from_deg:.0f}°{gusts} the aircraft cannot keep its track; it can fly "
-        "the mission if the fastest of the declared winds has {up_to_m_s:speed.1 down}"
+        "the aircraft cannot keep its track in a wind of {wind_m_s:speed.1} from {from_deg:.0f}°{gusts}; it can fly "
+        "the mission if the declared winds, gusts included, reach {up_to_m_s:speed.1 down} at most"
     ),
     "schedule_in_still_air": (
         "the time table holds in still air alone: in the declared winds nothing keeps the vehicles apart or in their "

@@ -8,7 +8,7 @@ flies no faster than commanded. ``g`` is concave in the wind (`docs/concepts/win
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -114,8 +114,8 @@ class WindsAlong:
     def bounds(self, cells: Floats, gust_m_s: float = 0.0) -> SpeedBounds:
         """The bounds of the speeds over ground in each cell that `speeds_m_s` are made of."""
         along, across, bow = self._corners(cells)
-        bow = bow + gust_m_s
-        at = self._expanded
+        # In any gust of u m/s it can fly what it could without one at an airspeed of u less.
+        at = replace(self._expanded, least_air_m_s=np.maximum(self._expanded.least_air_m_s - gust_m_s, 0.0))
         # What the arc of directions lies beyond its chord counts outward.
         low = np.minimum(
             at.slowest_m_s(along - bow[:, None], np.abs(across) + bow[:, None]),
@@ -127,7 +127,7 @@ class WindsAlong:
         of = self.part
         off = per_along[:, None, of] * (along - middle[0][:, None, of])
         off = off + per_across[:, None, of] * (across - middle[1][:, None, of])
-        off = off + (np.hypot(per_along, per_across)[:, of] * bow)[:, None]
+        off = off + (np.hypot(per_along, per_across)[:, of] * (bow + gust_m_s))[:, None]
         return SpeedBounds(slow, top, np.maximum.reduceat(off, self._first, axis=2))
 
     def costs(self, cells: Floats) -> tuple[Floats, Floats]:

@@ -71,6 +71,11 @@ class DeclaredWind:
         return float(self.speed_m_s.max())
 
     @property
+    def strongest_m_s(self) -> float:
+        """The highest speed of the set, gusts included, m/s."""
+        return self.most_m_s + self.gusts_add_m_s
+
+    @property
     def gusts_add_m_s(self) -> float:
         """How much a gust adds at most to any wind of the set, m/s."""
         return max((self.gust_m_s or 0.0) - self.most_m_s, 0.0)

@@ -325,18 +325,27 @@ def test_zones_of_objects_never_take_each_others_places() -> None:
 def test_a_forecast_counts_as_it_was_read_until_the_session_reloads(tmp_path: Path) -> None:
     def gusts(kmh: float) -> Path:
         file = tmp_path / "wind.json"
-        file.write_text(json.dumps(forecast(hourly__wind_gusts_10m=[kmh] * 6)), encoding="utf-8")
+        file.write_text(
+            json.dumps(
+                forecast(
+                    hourly__wind_speed_10m=[10.0] * 6,
+                    hourly__wind_speed_80m=[15.0] * 6,
+                    hourly__wind_gusts_10m=[kmh] * 6,
+                )
+            ),
+            encoding="utf-8",
+        )
         return file
 
     session = Planner({
-        **yaml.safe_load(mission()), "at": "2026-11-28T10:00Z", "wind": {"forecast": str(gusts(72.0))},
+        **yaml.safe_load(mission()), "at": "2026-11-28T10:00Z", "wind": {"forecast": str(gusts(20.0))},
     })  # fmt: skip
     before = session.plan().source.wind.gust_m_s
-    gusts(90.0)
+    gusts(23.6)
     session.change({"limits.min_agl_m": 31})
     assert session.plan().source.wind.gust_m_s == before
     session.reload()
-    assert session.plan().source.wind.gust_m_s == pytest.approx((before or 0.0) + 5.0)
+    assert session.plan().source.wind.gust_m_s == pytest.approx((before or 0.0) + 1.0)
 
 
 def test_a_session_plans_over_what_it_read_until_it_reloads(tmp_path: Path) -> None:

@@ -185,9 +185,9 @@ def test_a_wrong_number_stands_at_its_field(desk: Desk) -> None:
     form = next(a for a in reversed(desk.heard) if a["type"] == "state")["form"]
     assert "must be at least 0" in next(f["error"] for f in form if f["key"] == "limits.min_agl_m")
     assert desk.ask("change", "state", changes={"limits.min_agl_m": 40})["problems"] == []
-    assert "write 51 or more" in desk.ask("change", "error", changes={"limits.max_agl_m": 41})["message"]
+    assert "write max_agl_m 51 or more" in desk.ask("change", "error", changes={"limits.max_agl_m": 41})["message"]
     form = next(a for a in reversed(desk.heard) if a["type"] == "state")["form"]
-    assert "write 51 or more" in next(f["error"] for f in form if f["key"] == "limits.max_agl_m")
+    assert "write max_agl_m 51 or more" in next(f["error"] for f in form if f["key"] == "limits.max_agl_m")
 
 
 @pytest.mark.slow

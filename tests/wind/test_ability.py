@@ -94,3 +94,20 @@ def test_a_circle_in_a_wind_takes_its_integral():
     assert circle_ratio(6.0, 18.0, math.inf) == pytest.approx(elliptic / (1.0 - m), rel=1e-8)
     assert circle_ratio(2.0, 15.0, 10.0) == 1.0
     assert circle_ratio(18.0, 18.0, math.inf) == math.inf
+
+
+@given(
+    st.floats(0.0, 6.0), st.floats(0.0, 360.0), st.floats(0.0, 3.5), st.floats(0.0, 2.0 * math.pi), st.floats(0.0, 0.3)
+)
+def test_no_gust_makes_an_aircraft_slower_than_the_bound_with_gusts(speed_m_s, from_deg, gust_m_s, towards, slope):
+    able = on_one_part(0.0, slope, 14.0)
+    wind = along(able, (speed_m_s, speed_m_s), (from_deg, from_deg))
+    slow = wind.speeds_m_s(np.zeros((1, 2, 2)), gust_m_s)[0][0, 0]
+    angle = math.radians(from_deg)
+    blown = -speed_m_s * np.array([math.sin(angle), math.cos(angle)])
+    assert slow <= flown_m_s(able, blown + gust_m_s * np.array([math.cos(towards), math.sin(towards)])) + 1e-6
+
+
+def test_gusts_alone_leave_the_airspeed_less_the_gust():
+    able = along(on_one_part(0.0, 0.0, 10.0), (0, 0), (0, 0))
+    assert able.speeds_m_s(np.zeros((1, 2, 2)), 8.0)[0][0, 0] == pytest.approx(2.0)

@@ -62,7 +62,7 @@ EXPECTED: dict[str, tuple[Any, str]] = {
 }
 """The type of each argument by its name, and what it is in words."""
 
-NEEDED = {"planned", "folder", "what", "runs", "wind_m_s", "gusts_m_s", "noise_m", "timeout_s", "to", "url", "sysid",
+NEEDED = {"planned", "folder", "what", "runs", "gusts_m_s", "noise_m", "timeout_s", "to", "url", "sysid",
           "start", "goal", "min_agl_m", "kind", "autopilot", "mirror"}  # fmt: skip
 """Arguments that cannot be None."""
 

@@ -50,7 +50,7 @@ _RAY_RAD = 2.0 * math.pi / _RAYS
 class TooWindy:
     """The stretch on which a wind is too strong, that wind, and the highest speed of a set of its form that would do.
 
-    ``up_to_m_s`` was tried; with the gusts of the mission in proportion.
+    ``up_to_m_s`` has the gusts in it, and was tried: with all speeds of the set in proportion.
     """
 
     stretch: int
@@ -120,7 +120,7 @@ class FlightInWind:
         if bad is None:
             return None
         stretch, (east, north) = bad
-        most = self.wind.most_m_s
+        most = self.wind.strongest_m_s
         low, high = 0.0, 1.0
         for _ in range(_TRIED_STEPS):
             middle = 0.5 * (low + high)

@@ -79,7 +79,7 @@ class Kinematics:
         """
         if airspeed_m_s is None:
             spare = AIRSPEED_SPARE * vehicle.speed_max_m_s
-            airspeed_m_s = spare if vehicle.lean_angle_deg is None else math.inf
+            airspeed_m_s = spare if vehicle.largest_lean_deg is None else math.inf
         return cls(
             vehicle.climb_m_s, vehicle.descent_m_s,
             airspeed_m_s,
@@ -91,7 +91,7 @@ class Kinematics:
             accepts_m=vehicle.acceptance_m if vehicle.smooths else 0.0,
             land_below_m=PX4_LAND_BELOW_M if vehicle.autopilot is Autopilot.PX4 else 10.0,
             leg_accel_m_s2=CURVE_PEAK_ACCEL * vehicle.accel_m_s2,
-            lean_deg=vehicle.lean_angle_deg or math.inf,
+            lean_deg=vehicle.largest_lean_deg or math.inf,
         )  # fmt: skip
 
     def __post_init__(self) -> None:

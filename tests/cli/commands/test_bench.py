@@ -35,7 +35,7 @@ def test_a_directory_that_cannot_be_made_is_found_before_the_long_run(
 
 def test_every_command_says_in_its_help_what_it_measures(run: Any) -> None:
     named = [command.name for command in bench_app.registered_commands]
-    assert len(named) == len(set(named)) == 12
+    assert len(named) == len(set(named)) == 13
     overview = run("bench", "--help")[1]
     for name in named:
         assert str(name) in overview
