@@ -99,6 +99,9 @@ def _together(legs: Sequence[LegFigures]) -> LegFigures:
     )  # fmt: skip
 
 
+SAME_TIME_S = 1e-6
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class JudgedWind:
     """The winds that a flight was judged in. ``window`` is of the end of each leg, as `Verdict.clock_s` counts them.
@@ -208,6 +211,12 @@ class Verdict:
         begins_s = 0.0 if slot is None else slot.arrive_s - self.arrive_s
         ends = self.in_wind.window.earliest_s, self.in_wind.window.latest_s
         return tuple(begins_s + float(s[last]) - stays_s for s in ends)  # type: ignore[return-value]
+
+    @property
+    def unmoved_by_wind(self) -> bool:
+        """Whether each leg ends at the same time in every declared wind."""
+        window = None if self.in_wind is None else self.in_wind.window
+        return window is not None and bool((window.latest_s - window.earliest_s <= SAME_TIME_S).all())
 
     def leg_windows_s(self, slot: Slot | None = None) -> tuple[tuple[float, float], ...] | None:
         """The earliest and latest end of each leg, likewise, from leaving the ground as in `clock_s`."""

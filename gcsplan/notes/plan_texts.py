@@ -103,11 +103,14 @@ PLAN_TEXTS = {
     ),
     "judged_in_wind": (
         "the aircraft can fly the mission in all declared winds; windows of times stand beside the times in still air, "
-        "energies are those of the worst wind on each leg, and paths and corners are judged as in still air"
+        "energies are those of the worst wind on each leg, and a multicopter's corners are judged as in still air"
     ),
     "wind_too_strong": (
         "the aircraft cannot keep its track in a wind of {wind_m_s:speed.1} from {from_deg:.0f}°{gusts}; it can fly "
         "the mission if the declared winds, gusts included, reach {up_to_m_s:speed.1 down} at most"
+    ),
+    "schedule_in_every_wind": (
+        "no declared wind changes the time of a leg, so the time table, its order and its separation hold in each"
     ),
     "schedule_in_still_air": (
         "the time table holds in still air alone: in the declared winds nothing keeps the vehicles apart or in their "

@@ -101,7 +101,7 @@ def finished(
     if len(flown) > 1 and source.arrival is None:
         notes.append(Note("no_arrival_asked"))
     notes += fleet.notes
-    notes += _still_schedule(flown, fleet)
+    notes += _schedule_in_wind(flown, fleet)
     if brief.objective == "energy" and any(not v.verdict.energy_stated for v in flown):
         flown = tuple(replace(v, verdict=replace(v.verdict, energy_stated=True, paper_energy=True)) for v in flown)
         notes.append(Note("paper_energy_minimised"))
@@ -111,12 +111,15 @@ def finished(
     )  # fmt: skip
 
 
-def _still_schedule(flown: Sequence[VehiclePlan], fleet: FleetPlan) -> list[Note]:
-    """The note that a time table holds in still air alone, with the neighbours whose arrivals may change places."""
+def _schedule_in_wind(flown: Sequence[VehiclePlan], fleet: FleetPlan) -> list[Note]:
+    """The note that a time table holds in every declared wind, because none changes a time; or in still air alone, with
+    the neighbours whose arrivals may change places."""
     placed = sorted(((fleet.slot(v.name), v.verdict) for v in flown), key=lambda one: one[0].arrive_s)
     known = [w for w in (verdict.arrive_window_s(slot) for slot, verdict in placed) if w is not None]
     if len(known) < 2:
         return []
+    if all(verdict.unmoved_by_wind for _, verdict in placed):
+        return [Note("schedule_in_every_wind")]
     over_s = [before[1] - after[0] for before, after in pairwise(known)]
     return [Note("schedule_in_still_air", overlapping=sum(s > 0.0 for s in over_s), most_s=max(*over_s, 0.0))]
 

@@ -166,7 +166,7 @@ def separation_words(page: Page) -> str:
     a, b = found.least.vehicles
     near = f"{least(found.least.distance_m, 1, unit)} at {duration(found.least.time_s, 1)}"
     word = "kept" if found.safe else "<b>broken</b>"
-    still = " in still air" if any(s.window_s is not None for s in page.subjects) else ""
+    still = " in still air" if any(note.code == "schedule_in_still_air" for note in page.notes) else ""
     return f"Separation {word}{still}: {esc(a)} and {esc(b)} come nearest, {near} ({needed}; exact, not sampled)."
 
 

@@ -320,3 +320,13 @@ def test_the_file_of_a_hundred_is_a_fleet_of_a_hundred() -> None:
 def test_bad_arrivals_are_input_errors() -> None:
     with pytest.raises(InputError, match="interval_s"):
         planned({"mode": "sequence"})
+
+
+@pytest.mark.parametrize(("lean_deg", "note"), [(45, "schedule_in_every_wind"), (30, "schedule_in_still_air")])
+def test_a_time_table_holds_in_every_wind_only_where_none_changes_a_time(lean_deg: int, note: str) -> None:
+    arrival = {"mode": "sequence", "order": ["west", "south"], "interval_s": 20, "separation_m": 30}
+    lean = {"lean_angle_deg": lean_deg}
+    done = planned(arrival, lean, lean, wind={"up_to_m_s": 4})
+    assert [n.code for n in done.notes if n.code.startswith("schedule_in")] == [note]
+    widths = [np.diff(v.verdict.leg_windows_s() or ((0.0, math.inf),)).max() for v in done.vehicles]
+    assert (max(widths) < 1e-6) == (note == "schedule_in_every_wind")
