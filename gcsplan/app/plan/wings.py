@@ -233,8 +233,8 @@ def starts(problem: Problem, request: VehicleRequest, sharp: Floats) -> Iterator
     if request.climb_out == "circles":
         return _some(
             circling_ends(problem, required, sharp),
-            f"{request.vehicle.name}: no climb-out in circles clears the ground, the zones and the ceiling: write "
-            f"climb_out: straight, or give another start",
+            f"{request.vehicle.name}: no climb-out in circles clears the ground, the zones and the ceiling"
+            f"{_blown(request.vehicle)}: write climb_out: straight, or give another start",
         )
     straight = straight_ends(problem, required, sharp)
     first = next(straight, None)
@@ -243,9 +243,17 @@ def starts(problem: Problem, request: VehicleRequest, sharp: Floats) -> Iterator
     return _some(
         circling_ends(problem, required, sharp) if first is None else chain([first], straight),
         f"{request.vehicle.name}: no climb-out {which} clears the ground, the zones and the ceiling at "
-        f"{pitch_deg(request.vehicle)}° (max_climb_deg, whole degrees) and leads to where min AGL is met, straight "
-        f"or in circles: another {other} or a steeper climb may{beside_strip(problem.airspace)}",
+        f"{pitch_deg(request.vehicle)}° (max_climb_deg, whole degrees){_blown(request.vehicle)} and leads to where "
+        f"min AGL is met, straight or in circles: another {other} or a steeper climb may"
+        f"{beside_strip(problem.airspace) or ''}",
     )
+
+
+def _blown(vehicle: Vehicle) -> str:
+    """What the declared winds have to do with a climb-out or an approach that is not clear."""
+    if not vehicle.blows_m_s:
+        return ""
+    return f", with winds and gusts of up to {vehicle.wind_m_s:.1f} m/s that flatten it and carry it aside,"
 
 
 def goals(problem: Problem, request: VehicleRequest, sharp: Floats) -> Iterator[FlightEnd | None]:
@@ -259,8 +267,8 @@ def goals(problem: Problem, request: VehicleRequest, sharp: Floats) -> Iterator[
     return _some(
         straight_ends(problem, required, sharp[::-1]),
         f"{request.vehicle.name}: no straight approach to the goal, on any heading, clears the ground and the "
-        f"zones at max_descent_deg {request.vehicle.limits.max_descent_deg:g}: use end: loiter, or another goal"
-        f"{beside_strip(problem.airspace)}",
+        f"zones at max_descent_deg {request.vehicle.limits.max_descent_deg:g}{_blown(request.vehicle)}: use end: "
+        f"loiter, or another goal{beside_strip(problem.airspace) or ''}",
     )
 
 

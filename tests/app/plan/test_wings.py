@@ -599,6 +599,7 @@ def test_where_no_climb_out_is_legal_on_the_wanted_heading_the_refusal_names_it(
     with pytest.raises(NoMission, match="no climb-out on takeoff_heading_deg 210") as caught:
         plan(source)
     assert caught.value.reason == "not_found"  # searched in steps, with margins: not a proof
+    assert str(caught.value).endswith("another heading or a steeper climb may")
 
 
 def test_a_climb_out_that_obstacles_close_says_so_and_what_to_do() -> None:
