@@ -99,7 +99,7 @@ def _together(legs: Sequence[LegFigures]) -> LegFigures:
     )  # fmt: skip
 
 
-SAME_TIME_S = 1e-6
+UNMOVED_S = 1e-6
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -216,7 +216,7 @@ class Verdict:
     def unmoved_by_wind(self) -> bool:
         """Whether each leg ends at the same time in every declared wind."""
         window = None if self.in_wind is None else self.in_wind.window
-        return window is not None and bool((window.latest_s - window.earliest_s <= SAME_TIME_S).all())
+        return window is not None and bool((window.latest_s - window.earliest_s <= UNMOVED_S).all())
 
     def leg_windows_s(self, slot: Slot | None = None) -> tuple[tuple[float, float], ...] | None:
         """The earliest and latest end of each leg, likewise, from leaving the ground as in `clock_s`."""

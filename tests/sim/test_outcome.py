@@ -123,7 +123,7 @@ def test_nothing_is_late_that_never_arrives_or_has_no_plan() -> None:
     assert lateness(replace(part, arrive_s=None), trace(900.0, 999.0)) is None
 
 
-def test_an_arrival_is_outside_its_window_by_more_than_the_two_models_of_motion_differ() -> None:
+def test_an_arrival_is_outside_its_window_by_more_than_two_models_differ() -> None:
     window_s = 100.0, 120.0
     assert outside_s(window_s, 0.0, 110.0) == 0.0
     assert outside_s(window_s, 0.0, 120.6) == 0.0

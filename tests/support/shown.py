@@ -35,7 +35,7 @@ NUMBER = r"-?\d{1,3}(?:[\u2009\u202f]\d{3})+(?:\.\d+)?|-?\d+(?:\.\d+)?"
 UNIT = r"(?:km|mi|NM|mph|kt|m/s|ft/min|ft|m)(?![\w/])"
 QUANTITY = re.compile(
     rf"(?<!\w)(?P<first>{UNIT}) (?P<from>{NUMBER})(?: to (?P<to>{NUMBER}))?"  # mi 0.93 to 2.14
-    rf"|(?P<low>{NUMBER}) – (?P<high>{NUMBER})[\u202f ](?P<range>{UNIT})"
+    rf"|(?P<low>{NUMBER}) ?– ?(?P<high>{NUMBER})[\u202f ](?P<range>{UNIT})"
     rf"|(?P<value>{NUMBER})[\u202f ](?P<unit>{UNIT})(?: of (?P<limit>{NUMBER}),)?"
 )
 
