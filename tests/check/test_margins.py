@@ -80,6 +80,7 @@ def brute(done: Any) -> tuple[float, list[tuple[float, float]]]:
 
 
 @pytest.mark.slow
+@pytest.mark.nightly_but("zone0-over", "zone2-under")
 @pytest.mark.parametrize(
     ("zone", "side"),
     [

@@ -313,6 +313,7 @@ def test_random_missions_on_the_sample_are_solved_safely(seed: int) -> None:
 
 
 @pytest.mark.first_quick
+@pytest.mark.nightly_but("20", "21")
 @pytest.mark.parametrize("seed", [20, pytest.param(21, marks=pytest.mark.slow), 22])
 def test_random_missions_under_the_120_m_rule(seed: int) -> None:
     assert faults_of_plan(random_mission(seed, replace(FIELD, min_agl_m=50.0, max_agl_m=120.0), zones=6)) == []

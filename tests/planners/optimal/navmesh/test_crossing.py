@@ -88,6 +88,7 @@ def test_no_place_of_the_outline_in_reach_is_the_limit() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.nightly_but("seeds0")
 @pytest.mark.parametrize("seeds", [range(12), range(12, 120)])
 def test_the_bound_is_that_of_brute_force(seeds: range) -> None:
     for seed in seeds:

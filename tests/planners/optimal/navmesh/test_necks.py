@@ -46,7 +46,7 @@ def passed(problem: Problem, points: Floats, z: Floats) -> bool:
 
 
 @pytest.mark.first_quick
-@pytest.mark.nightly_but("hills-clearance", "tall-clearance", "turned-clearance")
+@pytest.mark.nightly_but("tall-clearance", "turned-clearance")
 @pytest.mark.draws
 @pytest.mark.parametrize(
     "limits", ["clearance", *(pytest.param(k, marks=pytest.mark.nightly) for k in ("bare", "errors"))]
