@@ -130,8 +130,8 @@ def l1_off_m(
         push = gain * math.sin(min(max(turn_to_fly, -0.5 * math.pi), 0.5 * math.pi))
         bank += (min(max(math.atan(push / GRAVITY_M_S2), -most), most) - bank) * STEP_S / BANK_S
         heading += GRAVITY_M_S2 * math.tan(bank) / speed_m_s * STEP_S
-        x += over_x * STEP_S
-        y += over_y * STEP_S
+        x += (speed_m_s * math.cos(heading) + wind_m_s[0]) * STEP_S
+        y += (speed_m_s * math.sin(heading) + wind_m_s[1]) * STEP_S
         off = min(
             math.hypot(max(x + tangent, 0.0), y),
             math.hypot(max(tangent - cos * x - sin * y, 0.0), cos * y - sin * x),
@@ -166,7 +166,8 @@ def circle_off_m(radius_m: float, speed_m_s: float, wind_m_s: float, tuning: Tun
     worst, omega = 0.0, 2.0 * math.pi / tuning.l1_period_s
     most = math.radians(min(tuning.roll_deg, MOST_BANK_DEG))
     east, north = winds[0]  # the circle is the same in every direction
-    x, y, heading, bank = radius_m, 0.0, 0.5 * math.pi + math.asin(min(east / speed_m_s, 1.0)), 0.0
+    x, y, heading = radius_m, 0.0, 0.5 * math.pi + math.asin(min(east / speed_m_s, 1.0))
+    bank = min(math.atan((speed_m_s * math.sin(heading) + north) ** 2 / (radius_m * GRAVITY_M_S2)), most)
     slowest = speed_m_s - math.hypot(east, north)
     for _ in range(math.ceil(LAPS * 2.0 * math.pi * radius_m / slowest / STEP_S)):
         over_x, over_y = speed_m_s * math.cos(heading) + east, speed_m_s * math.sin(heading) + north
@@ -182,7 +183,9 @@ def circle_off_m(radius_m: float, speed_m_s: float, wind_m_s: float, tuning: Tun
         circle = steers + around**2 / max(0.5 * radius_m, radius_m + off)
         push = capture if off > 0.0 and capture < circle else circle
         bank += (min(max(math.atan(push / GRAVITY_M_S2), -most), most) - bank) * STEP_S / BANK_S
-        heading += GRAVITY_M_S2 * math.tan(bank) / speed_m_s * STEP_S
-        x, y = x + over_x * STEP_S, y + over_y * STEP_S
+        turned = GRAVITY_M_S2 * math.tan(bank) / speed_m_s * STEP_S
+        x += (speed_m_s * math.cos(heading + 0.5 * turned) + east) * STEP_S
+        y += (speed_m_s * math.sin(heading + 0.5 * turned) + north) * STEP_S
+        heading += turned
         worst = max(worst, math.hypot(x, y) - radius_m)
     return worst
