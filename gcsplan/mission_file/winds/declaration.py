@@ -137,7 +137,7 @@ def _heights(levels: Sequence[WindLevelKeys], where: str, problems: list[Mistake
     for i, (one, other) in enumerate(pairwise(found), 1):
         at = f"{where}[{i}].{other[0]}_m"
         if one[0] != other[0]:
-            words = f"must count as the levels before it do: give {found[0][0]}_m, or all {at[-6:]}"
+            words = f"must count as the levels before it do: give {found[0][0]}_m, or all {other[0]}_m"
             problems.append(Mistake(at, words))
             break
         if other[1] <= one[1]:

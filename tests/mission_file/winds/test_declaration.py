@@ -171,6 +171,8 @@ def test_levels_rise_and_count_from_the_same() -> None:
     [(place, words)] = problems({"levels": [level(agl_m=10), level(agl_m=20), level(amsl_m=900)]})
     assert place == "wind.levels[2].amsl_m"
     assert "give agl_m, or all amsl_m" in words
+    [(_, words)] = problems({"levels": [level(amsl_m=900), level(agl_m=20)]})
+    assert "give amsl_m, or all agl_m" in words
 
 
 def test_gusts_that_equal_the_wind_in_another_unit_are_taken() -> None:
