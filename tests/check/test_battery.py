@@ -176,7 +176,8 @@ def test_what_is_short_is_what_sampling_finds(
             if not climbs_first:
                 more = detour_home_m(replace(v, autopilot=autopilot), v.speed_max_m_s, at[2])
             top = max(300.0 + level, at[2]) if climbs_first else 300.0 + level
-            need = spent + f * leg.energy_j + R2 * (away + more) + R1 * (abs(top - at[2]) + top - 300.0)
+            waits_j = WAITS_J if climbs_first else 0.0
+            need = spent + f * leg.energy_j + R2 * (away + more) + R1 * (abs(top - at[2]) + top - 300.0) + waits_j
             most = max(most, need)
             s = along + f * leg.horizontal_m
             inside = any(x - 1.0 <= s <= y + 1.0 for x, y in found.short)
