@@ -24,7 +24,7 @@ from gcsplan.check.margins import enough, nearest_misses, nearest_pass
 from gcsplan.check.motion.project import PlaneLegs, legs_in_plane, steep_report, why_unknown, with_error_of_home
 from gcsplan.check.motion.stretch import Flight, Stretch, degree_m
 from gcsplan.check.motion.turn_parameters import DEFAULTS, Tuning
-from gcsplan.check.verdict import JudgedWind, LegFigures, Verdict
+from gcsplan.check.verdict import LegFigures, Verdict
 from gcsplan.mavlink.mission.autopilots import needs_straight, profile_of
 from gcsplan.mavlink.mission.mission import Home, Mission
 from gcsplan.mavlink.mission.parameter_list import FlightExtent
@@ -118,7 +118,7 @@ def judge(
         mission, figures, tuple(findings), tuple(flight.not_judged), tuple(flight.notes), misses=near, zone_pass=over,
         energy_stated=vehicle.energy.stated, paper_energy=vehicle.energy.papers,
         extent=extent_of([*flight.stretches, *others], flown, mission.home, limits, home_error_m),
-        in_wind=None if blown is None else JudgedWind(blown.flies_in, blown.window if costs else None),
+        in_wind=blown,
     )  # fmt: skip
     return _with_battery(verdict, vehicle, flight, costs)
 

@@ -15,9 +15,8 @@ from gcsplan.mavlink.mission.parameter_list import FlightExtent
 from gcsplan.notes.note import IN_FILES, Finding, Note, Wording
 
 if TYPE_CHECKING:
+    from gcsplan.check.flight.winds import FlightInWind
     from gcsplan.fleet.arrival import Slot
-    from gcsplan.wind.declared import FlightWind
-    from gcsplan.wind.window import TimeWindow
 
 
 PAPER_MARK = " (paper's figures)"
@@ -102,17 +101,6 @@ def _together(legs: Sequence[LegFigures]) -> LegFigures:
 UNMOVED_S = 1e-6
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class JudgedWind:
-    """The winds that a flight was judged in. ``window`` is of the end of each leg, as `Verdict.clock_s` counts them.
-
-    None if the flight cannot be flown in one of them.
-    """
-
-    wind: FlightWind
-    window: TimeWindow | None
-
-
 @dataclass(frozen=True, slots=True)
 class Verdict:
     """The result of the check of ``mission`` (as sent), which judges the items as the autopilot stores them.
@@ -121,9 +109,9 @@ class Verdict:
     round without end, seconds until the battery is down to its reserve. ``zone_pass``: the nearest zone that is passed
     over or under. ``energy_stated``: the vehicle's energy was given; else energies say nothing and are not reported.
     ``paper_energy``: energies count the paper's numbers, for the vehicle's own were not given. ``extent``: the greatest
-    distances of the flight from home, errors counted; None where nothing was judged. ``in_wind``: the declared winds,
-    None for still air. Times are in still air; energies are those of the worst declared wind, leg by leg, or of still
-    air where that takes more.
+    distances of the flight from home, errors counted; None where nothing was judged. ``in_wind``: the flight in the
+    declared winds, None for still air; its windows are computed when they are read first. Times are in still air;
+    energies are those of the worst declared wind, leg by leg, or of still air where that takes more.
     """
 
     mission: Mission
@@ -138,7 +126,7 @@ class Verdict:
     energy_stated: bool = True
     paper_energy: bool = False
     extent: FlightExtent | None = None
-    in_wind: JudgedWind | None = None
+    in_wind: FlightInWind | None = None
 
     def __repr__(self) -> str:
         return f"<Verdict of {self.mission.name!r}: {self.word}, {len(self.legs)} legs, {self.length_m:.0f} m>"

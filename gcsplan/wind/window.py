@@ -112,9 +112,9 @@ def _searched(winds: WindsAlong, clock: FlightClock) -> TimeWindow:
         open_ = np.flatnonzero(excess > 0.0)
         if not len(open_) or looked >= MOST_WIND_CELLS:
             break
-        worst = open_[np.argsort(-excess[open_], kind="stable")][: max(_TURNS, len(open_) // 4)].tolist()
-        cells = np.concatenate([_halves(kept[i][0], winds) for i in worst])
-        kept = [one for i, one in enumerate(kept) if i not in set(worst)]
+        halved = open_[np.argsort(-excess[open_], kind="stable")][: max(_TURNS, len(open_) // 4)].tolist()
+        cells = np.concatenate([_halves(kept[i][0], winds) for i in halved])
+        kept = [one for i, one in enumerate(kept) if i not in halved]
     bounds = [bound for _, bound in kept]
     return TimeWindow(np.min([b.earliest_s for b in bounds], axis=0), np.max([b.latest_s for b in bounds], axis=0))
 

@@ -45,11 +45,11 @@ def beyond_hours(verdict: Verdict, hours: Hours | None) -> Note | None:
 def beyond_forecast(verdict: Verdict, waits_s: float = 0.0) -> Note | None:
     """Why the hours of a forecast do not hold the flight, which begins so long after T+0; None if they do."""
     blown = verdict.in_wind
-    if blown is None or blown.window is None or len(blown.wind.declared.times_s) == 1:
+    if blown is None or len(blown.wind.times_s) == 1 or blown.window is None:
         return None
-    until_s = float(blown.wind.declared.times_s[-1])
+    until_s = float(blown.wind.times_s[-1])
     lands = landing_of(verdict, datetime.fromtimestamp(until_s, UTC)) is not None
-    if lands and blown.wind.departs_s[0] + waits_s + float(blown.window.latest_s[-1]) <= until_s:
+    if lands and blown.flies_in.departs_s[0] + waits_s + float(blown.window.latest_s[-1]) <= until_s:
         return None
     return Note("flies_beyond_forecast", until=_shown(datetime.fromtimestamp(until_s, UTC)))
 

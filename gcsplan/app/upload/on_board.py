@@ -131,7 +131,7 @@ def judge_on_board(
         spacing = values.get("TERRAIN_SPACING", math.nan)
         spaced = world.with_posts(int(spacing)) if spacing >= 1.0 else world
         error_m = terrain_error_m(values, job.terrain_error_m)
-        wind = None if job.verdict is None or job.verdict.in_wind is None else job.verdict.in_wind.wind
+        wind = None if job.verdict is None or job.verdict.in_wind is None else job.verdict.in_wind.flies_in
         verdict = judge(
             flown, flies, spaced, rtl_rel_home_m=rtl_rel_home_m, terrain_error_m=error_m, tuning=tuning, wind=wind
         )

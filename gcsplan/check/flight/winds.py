@@ -132,9 +132,12 @@ class FlightInWind:
         return TooWindy(stretch, math.hypot(east, north), come_from, up_to_m_s)
 
     @cached_property
-    def window(self) -> TimeWindow:
-        """The window of the end of each stretch, its hold and its rounds included, and with the share of gusts."""
-        return self._timed[0]
+    def window(self) -> TimeWindow | None:
+        """The window of the end of each stretch, its hold and its rounds included, and with the share of gusts.
+
+        None if the flight cannot be flown in one of the winds.
+        """
+        return None if self.too_windy is not None else self._timed[0]
 
     @cached_property
     def _timed(self) -> tuple[TimeWindow, Floats]:

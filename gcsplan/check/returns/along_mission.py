@@ -77,9 +77,9 @@ def return_by_mission(
 ) -> ByMission:
     """Judge the returns that join the mission at one of ``joins``; ``landing``: wire items of landings."""
     past = math.inf if joins.past_seq is None else joins.past_seq
-    wind = verdict.in_wind
+    flies_in = None if verdict.in_wind is None else verdict.in_wind.flies_in
     heights_m = float(trace.amsl.min()), float(trace.amsl.max())
-    ways = None if wind is None else WaysHome(vehicle, wind.wind, heights_m)
+    ways = None if flies_in is None else WaysHome(vehicle, flies_in, heights_m)
     judge = _Judge(trace, joins.joins, vehicle, ways)
     length = float((trace.last - trace.first).sum())
     parts = trace.cut(max(FIRST_M, length / FIRST_PARTS))

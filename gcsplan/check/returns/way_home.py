@@ -184,7 +184,7 @@ def _along_mission(
     home = _not_judged(verdict, vehicle, judged_m, False, ())
     if vehicle.autopilot is Autopilot.PX4:
         return replace(home, route="mission", not_judged=(Note("px4_joins_unread"),))
-    wind = None if verdict.in_wind is None else verdict.in_wind.wind
+    wind = None if verdict.in_wind is None else verdict.in_wind.flies_in
     joins = joins_of(stored, flight, vehicle, trace.world, wind)
     known = _but_the_return(flight)
     if joins.why_not:
