@@ -143,6 +143,8 @@ def l1_off_m(
 
 
 LAPS = 3
+WIDEST_CIRCLE_M = 1000.0
+"""A wider circle is simulated as this one, outside of which an aircraft gets farther."""
 
 
 def circle_reach_m(radius_m: float, amsl_m: float, speed_m_s: float, wind_m_s: float) -> float:
@@ -151,7 +153,9 @@ def circle_reach_m(radius_m: float, amsl_m: float, speed_m_s: float, wind_m_s: f
     ``speed_m_s`` is the indicated airspeed.
     """
     flown_m, true = radius_m * circle_growth(amsl_m), speed_m_s * math.sqrt(circle_growth(amsl_m))
-    return flown_m + circle_off_m(math.ceil(flown_m), math.ceil(true), math.ceil(10.0 * wind_m_s) / 10.0)
+    # A smaller circle is left farther; so is a faster one, unless the wind leaves little headway.
+    least_m, wind = min(max(math.floor(flown_m), 1.0), WIDEST_CIRCLE_M), math.ceil(10.0 * wind_m_s) / 10.0
+    return flown_m + max(circle_off_m(least_m, speed, wind) for speed in (math.floor(true), math.ceil(true)))
 
 
 @lru_cache(maxsize=1024)

@@ -10,7 +10,7 @@ import pytest
 
 from gcsplan.check.fixed_wing.ends import blown_slant, drift_of
 from gcsplan.check.judge import judge
-from gcsplan.check.motion.circles import circle_off_m, circle_reach_m, tracking_m
+from gcsplan.check.motion.circles import circle_growth, circle_off_m, circle_reach_m, tracking_m
 from gcsplan.check.verdict import Verdict
 from gcsplan.mission_file.vehicles import in_wind
 from gcsplan.vehicle import Vehicle
@@ -124,3 +124,17 @@ def test_turns_and_circles_are_wider_the_stronger_the_wind(radius_m: float, spee
     assert circles == sorted(circles)
     assert circles[0] == 0.0
     assert circle_reach_m(radius_m, 300.0, speed_m_s, 6.0) > circle_reach_m(radius_m, 300.0, speed_m_s, 0.0) + 1.0
+
+
+@pytest.mark.parametrize(
+    ("radius_m", "speed_m_s", "wind_m_s"), [(40.9, 17.3, 6.0), (60.5, 23.4, 8.0), (41.0, 12.1, 9.9)]
+)
+def test_no_circle_is_left_farther_than_its_reach(radius_m: float, speed_m_s: float, wind_m_s: float) -> None:
+    growth = circle_growth(0.0)
+    flown_m, true_m_s = radius_m * growth, speed_m_s * math.sqrt(growth)
+    exact_m = flown_m + circle_off_m(flown_m, true_m_s, wind_m_s)
+    assert exact_m <= circle_reach_m(radius_m, 0.0, speed_m_s, wind_m_s) <= exact_m + 12.0
+
+
+def test_a_circle_of_any_radius_is_simulated_in_little_time() -> None:
+    assert 1e6 * circle_growth(0.0) < circle_reach_m(1e6, 0.0, 20.0, 5.0) < 1e6 * circle_growth(0.0) + 1.0
