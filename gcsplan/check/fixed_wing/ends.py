@@ -148,7 +148,7 @@ def drift_of(vehicle: Vehicle, east_m: float, north_m: float) -> tuple[float, fl
 def blown_slant(ground: Place, top: Place, aside_m: float, from_part: float) -> list[tuple[Place, Place, float]]:
     """A climb-out that is carried aside by ``aside_m``, from a part of its way on: parts, and how far each is carried.
 
-    None if it is not. A place may be any three numbers.
+    Without parts if it is not carried. A place may be any three numbers.
     """
     if not aside_m > 0.0:
         return []
@@ -211,7 +211,7 @@ def circle_up(pilot: Aboard, seq: int, item: MissionItem, radius_m: float) -> bo
     # A climb that is steeper than judged reaches these altitudes before the circle.
     middle, half = 0.5 * (low[2] + target[2]), 0.5 * (target[2] - low[2])
     start, end = ((*place[:2], middle) for place in (pilot.home, pilot.at))
-    pilot.instead(seq, "takeoff", start, end, column=True, band_m=half)
+    pilot.instead(seq, "takeoff", start, end, column=True, band_m=half, reach_m=blown_m)
     pilot.note(Note("climb_out_circles", seq, reach_m=reach_m))
     pilot.low_m, pilot.around_m = min(REACHED_M, target[2] - low[2]), reach_m
     pilot.at, pilot.direction = target, None

@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 
 from gcsplan.check.fixed_wing.ends import blown_slant, drift_of
+from gcsplan.check.flight.follow import follow
 from gcsplan.check.judge import judge
 from gcsplan.check.motion.circles import circle_growth, circle_off_m, circle_reach_m, tracking_m
 from gcsplan.check.verdict import Verdict
+from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mission_file.vehicles import in_wind
 from gcsplan.vehicle import Vehicle
 from gcsplan.wind.declared import STILL_AIR, DeclaredWind
@@ -86,6 +88,15 @@ def test_a_climb_out_flown_in_any_wind_is_within_what_is_judged(wind: DeclaredWi
             assert up >= along * rise_m / run_m - 0.02 * rise_m  # the slant's speed is 20, not 20 cos 8°
             k = min(max(int(4.0 * along / run_m), 0), 3)
             assert off <= (parts[k][2] if parts else 0.0) + 0.02 * aside_m + 1e-9
+
+
+def test_a_steeper_climb_than_judged_before_a_circle_is_carried_aside_too() -> None:
+    vehicle = blown(winds((5.0, 5.0), (180.0, 180.0)))
+    climbs = wings.mission(wings.take_off(40.0), wings.at(cmd.LOITER_TO_ALT, 340.0, 100.0, 160.0, 0.0, 100.0))
+    flight = follow(climbs, vehicle, wings.FLAT.ground_amsl, wings.FLAT.read_amsl)
+    drift_m = next(n for n in flight.notes if n.code == "climb_out_blown").data["drift_m"]
+    [space] = [s for s in flight.instead if s.band_m == 60.0 and s.start[:2] == wings.HOME_DEG]
+    assert space.reach_m == drift_m > 50.0
 
 
 def test_still_air_has_no_drift_and_no_parts() -> None:
