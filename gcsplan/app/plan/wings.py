@@ -242,8 +242,8 @@ def starts(problem: Problem, request: VehicleRequest, sharp: Floats) -> Iterator
     other = "start" if given is None else "heading"
     return _some(
         circling_ends(problem, required, sharp) if first is None else chain([first], straight),
-        f"{request.vehicle.name}: no climb-out {which} clears the ground, the zones and the ceiling at "
-        f"{pitch_deg(request.vehicle)}° (max_climb_deg, whole degrees){_blown(request.vehicle)} and leads to where "
+        f"{request.vehicle.name}: no climb-out {which} clears the ground, the zones and the ceiling"
+        f"{_blown(request.vehicle)} at {pitch_deg(request.vehicle)}° (max_climb_deg, whole degrees) and leads to where "
         f"min AGL is met, straight or in circles: another {other} or a steeper climb may"
         f"{beside_strip(problem.airspace) or ''}",
     )
@@ -251,9 +251,7 @@ def starts(problem: Problem, request: VehicleRequest, sharp: Floats) -> Iterator
 
 def _blown(vehicle: Vehicle) -> str:
     """What the declared winds have to do with a climb-out or an approach that is not clear."""
-    if not vehicle.blows_m_s:
-        return ""
-    return f", with winds and gusts of up to {vehicle.wind_m_s:.1f} m/s that flatten it and carry it aside,"
+    return f" in winds and gusts of up to {vehicle.wind_m_s:.1f} m/s" if vehicle.blows_m_s else ""
 
 
 def goals(problem: Problem, request: VehicleRequest, sharp: Floats) -> Iterator[FlightEnd | None]:

@@ -602,6 +602,13 @@ def test_where_no_climb_out_is_legal_on_the_wanted_heading_the_refusal_names_it(
     assert str(caught.value).endswith("another heading or a steeper climb may")
 
 
+@pytest.mark.slow
+def test_a_climb_out_that_is_not_clear_in_declared_winds_names_them_in_a_sentence() -> None:
+    text = text_of(takeoff_heading_deg="210") + "\nwind: {up_to_m_s: 3}\n"
+    with pytest.raises(NoMission, match=r"the ceiling in winds and gusts of up to 3\.0 m/s at 8° \(max_climb_deg"):
+        plan(load_mission(MISSIONS / "m.yaml", text=text))
+
+
 def test_a_climb_out_that_obstacles_close_says_so_and_what_to_do() -> None:
     forested = text_of().replace("obstacle_height_m: 0", "obstacle_height_m: 12")  # altitude_error_m is 8
     with pytest.raises(NoMission, match=r"obstacle_height_m puts them everywhere.*give `canopy`"):
