@@ -284,7 +284,7 @@ def rehearse(
         runs=runs, seed=seed, progress=progress, jobs=jobs,
     )  # fmt: skip
     returns.judged(planned, home=False)
-    if seed < 0:
+    if seed is None or seed < 0:
         raise wrong_argument("rehearse()", "seed", seed, "a whole number, 0 or more")
     wind_m_s, from_deg = (None if value is None else float(value) for value in (wind_m_s, from_deg))
     weather = rehearsing.weather_of(planned.source, wind_m_s, from_deg, float(gusts_m_s), float(noise_m))

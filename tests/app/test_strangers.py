@@ -191,6 +191,7 @@ def test_strange_arguments_of_the_functions_are_refused_by_name(planned: Plan, t
             "flat_m": lambda value=value: api.new("36.6,-84.3", "36.61,-84.3", flat_m=value),
             "dem": lambda value=value: api.new("36.6,-84.3", "36.61,-84.3", dem=[value]),
             "wind": lambda value=value: api.rehearse(planned, wind_m_s=value, seed=-1),
+            "seed": lambda value=value: api.rehearse(planned, runs=0, seed=value),
             "mission": lambda value=value: api.fetch_dem([value]),  # type: ignore[arg-type]
             "options": lambda value=value: plan(FLAT, options=value, objective="x"),
             "objective": lambda value=value: plan(FLAT, objective="x", planner=value),
