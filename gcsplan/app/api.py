@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, overload
 
@@ -26,6 +27,7 @@ from gcsplan.app.fleet.may_fly import flyable, require_passing
 from gcsplan.app.output import files as outputs
 from gcsplan.app.plan import way_home as returns
 from gcsplan.app.plan.arguments import require
+from gcsplan.app.plan.flight_hours import within_hours
 from gcsplan.app.plan.model import Plan
 from gcsplan.app.upload import run as uploads
 from gcsplan.app.upload.job import LINK, JobResult, ProgressCall, UploadOptions
@@ -92,13 +94,14 @@ def check(
     if isinstance(what, Plan):
         if within is not None or vehicle is not None:
             raise UsageError("a plan is judged whole, in its own world: give nothing else to check")
-        return {
-            v.name: judge(
+        source, flown = what.source, []
+        for v in what.vehicles:
+            again = judge(
                 v.mission, v.request.vehicle, what.world, rtl_rel_home_m=v.request.rtl_rel_home_m,
-                terrain_error_m=what.source.terrain_error_m, wind=what.source.flight_wind,
-            )
-            for v in what.vehicles
-        }  # fmt: skip
+                terrain_error_m=source.terrain_error_m, wind=source.flight_wind,
+            )  # fmt: skip
+            flown.append(replace(v, verdict=again))
+        return {v.name: v.verdict for v in (flown if what.fleet is None else within_hours(source, flown, what.fleet))}
     if within is None:
         raise UsageError("in which world? Give check a plan or a mission file as its second argument")
     if isinstance(within, Plan):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
 from typing import Any
 
 HOURS = [f"2026-11-28T{hour:02d}:00" for hour in range(10, 16)]
@@ -32,3 +34,14 @@ def forecast(**changes: Any) -> dict[str, Any]:
         else:
             inside[key] = value
     return whole
+
+
+def mission_in_forecast(file: Path, at: list[str], goal_deg: tuple[float, float]) -> dict[str, Any]:
+    """A mission of one fast copter from the forecast's place, in a light wind of it, which is written to ``file``."""
+    calm = {f"hourly__wind_{key}": [9.0] * len(HOURS) for key in ("speed_10m", "speed_80m", "gusts_10m")}
+    file.write_text(json.dumps(forecast(**calm)))
+    vehicle = {"name": "uav1", "sysid": 1, "autopilot": "arducopter", "start": [47.0, 8.01], "goal": list(goal_deg)}
+    return {
+        "version": 1, "terrain": {"flat_m": 100}, "limits": {"min_agl_m": 30, "max_agl_m": 120}, "at": at,
+        "wind": {"forecast": str(file)}, "vehicles": [vehicle | {"speed_m_s": 15}],
+    }  # fmt: skip

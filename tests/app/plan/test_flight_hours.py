@@ -1,4 +1,4 @@
-"""Whether a flight lies within the hours for which zones were left out."""
+"""Whether a flight lies within the hours for which zones were left out, and those of a forecast."""
 
 from __future__ import annotations
 
@@ -6,9 +6,11 @@ import math
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from functools import cache
+from pathlib import Path
 
 import pytest
 
+from gcsplan.app.api import check
 from gcsplan.app.fleet.pipeline import plan
 from gcsplan.app.plan.flight_hours import FAR_S, beyond_hours, hours_left, landing_of, waits_s, within_hours
 from gcsplan.app.plan.model import Plan
@@ -17,6 +19,7 @@ from gcsplan.errors import InputError
 from gcsplan.mission_file import load_mission
 from gcsplan.mission_file.published.times import Hours
 from tests.support.batches import mission
+from tests.support.forecasts import mission_in_forecast
 
 TEN = datetime(2026, 11, 24, 10, tzinfo=UTC)
 
@@ -79,3 +82,13 @@ def test_a_vehicle_that_waits_has_fewer_hours_left() -> None:
     assert left == Hours(TEN + timedelta(seconds=wait_s), TEN + timedelta(hours=1))
     assert hours_left(source, v, None) == source.hours
     assert hours_left(replace(source, hours=None), v, made.fleet) is None
+
+
+def test_a_flight_beyond_its_forecast_is_not_judged_however_it_is_checked(tmp_path: Path) -> None:
+    late = ["2026-11-28T13:55Z", "2026-11-28T13:59Z"]  # the forecast ends at 14:00
+    source = load_mission(mission_in_forecast(tmp_path / "f.json", late, (47.0, 8.07)))
+    made = plan(source)
+    for judged in (made.vehicles[0].verdict, check(made)["uav1"], check(made.vehicles[0].mission, source)):
+        assert isinstance(judged, Verdict)
+        assert judged.safe is None
+        assert [note.code for note in judged.not_judged] == ["flies_beyond_forecast"]
