@@ -90,6 +90,9 @@ def plan(  # noqa: PLR0913 - options by name, each with a default
         source = load_mission(source, departure=gate_utc, at=at)
     elif at is not None:
         raise InputError("the mission is read already: give `at` to load_mission", where="at")
+    elif gate_utc is not None and len(source.wind.times_s) > 1 and source.departure != gate_utc:
+        words = "the mission is read already, with its forecast from another departure on: give `departure` to "
+        raise InputError(f"{words}load_mission", where="gate_utc")
     keys = dict(elements("plan()", "options", (options or {}).items(), tuple, "a mapping of a planner's keys"))
     brief = _brief_of(source, PlanOptions(planner, objective, seed, keys))
     if leave_out is None:
