@@ -134,8 +134,8 @@ class UploadJob:
     ``way_home`` is None unless it was judged. ``home_required``: a vehicle that returns at another altitude is refused.
     ``fence`` and ``rally`` are sent before the mission. ``own``: the lists of its file, by kind; ``unsent`` names each
     of them that is not sent. ``ground`` is sent to a vehicle that flies the terrain frame. ``hours``: the hours of the
-    flight from its departure on, if a zone was left out for them. ``fleet``: the other vehicles' motions, from which
-    this one keeps apart as its parameters make it fly.
+    flight from its departure on, if a zone was left out for them; ``waits_s``: how long after T+0 that is. ``fleet``:
+    the other vehicles' motions, from which this one keeps apart as its parameters make it fly.
     """
 
     name: str
@@ -151,6 +151,7 @@ class UploadJob:
     home_required: bool = False
     ground: GroundHeights | None = None
     hours: Hours | None = None
+    waits_s: float = 0.0
     fleet: FleetOnBoard | None = None
     rally: tuple[MissionItem, ...] = ()
     own: Mapping[int, tuple[MissionItem, ...]] = field(default_factory=dict)

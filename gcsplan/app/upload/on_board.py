@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from gcsplan.app.plan.flight_hours import beyond_hours
+from gcsplan.app.plan.flight_hours import beyond_forecast, beyond_hours
 from gcsplan.app.plan.way_home import against_on_board
 from gcsplan.app.upload.fence import against_fence
 from gcsplan.check.judge import judge
@@ -138,7 +138,8 @@ def judge_on_board(
         if not (verdict.safe is True or (verdict.safe is None and allow_unjudged)):
             unjudged = (Note("not_judged_on_board", why=note) for note in verdict.not_judged)
             return Note("breaks_limits_on_board", found=(*(f.note for f in verdict.findings), *unjudged))
-        if not allow_unjudged and (beyond := beyond_hours(verdict, job.hours)):
+        beyond = beyond_hours(verdict, job.hours) or beyond_forecast(verdict, job.waits_s)
+        if beyond and not allow_unjudged:
             return Note("not_judged_on_board", why=beyond)
         if flies != vehicle:
             against = _against_motion(job, flies, verdict, found, values, allow_parameters=allow_parameters)

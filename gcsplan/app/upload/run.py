@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 
 from gcsplan.app.check.files import check_files
 from gcsplan.app.check.worlds import Checked, split_name
-from gcsplan.app.plan.flight_hours import hours_left
+from gcsplan.app.plan.flight_hours import hours_left, waits_s
 from gcsplan.app.plan.model import Plan
 from gcsplan.app.upload.fence import KEY_OF_LIST, NAME_OF_LIST, ListEnds, not_held, upload_lists
 from gcsplan.app.upload.job import (
@@ -131,7 +131,8 @@ def jobs_of(
         UploadJob(
             v.name, where[v.name], v.mission, v.verdict, v.request.vehicle, plan.world, v.request.rtl_rel_home_m,
             source.terrain_error_m, way_home=homes.get(v.name), home_required=home_required, ground=ground,
-            hours=hours_left(source, v, plan.fleet), fleet=fleet,
+            hours=hours_left(source, v, plan.fleet), waits_s=0.0 if plan.fleet is None else waits_s(v, plan.fleet),
+            fleet=fleet,
             own={RALLY: rally_items(homes[v.name].rally)} if rally and where[v.name] and v.name in homes else {},
         )
         for v in plan.vehicles if v.name in where

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -13,6 +16,7 @@ from gcsplan.app.upload.on_board import judge_on_board, settings_of
 from gcsplan.app.upload.run import jobs_of
 from gcsplan.mavlink.mission.parameter_names import OnBoard
 from gcsplan.notes.note import Note
+from tests.support.forecasts import mission_in_forecast
 
 OFF = Note("parameter_not_assumed", name="LAND_SPEED", value=30.0, assumed="50", wanted=50.0,
            why=Note("assumed_last_ten_metres"))  # fmt: skip
@@ -115,3 +119,23 @@ def test_what_breaks_a_limit_on_board_is_each_finding_as_data() -> None:
     assert low.code == "breaks_limits_on_board"
     assert low.data["found"]
     assert all(isinstance(note, Note) for note in low.data["found"])  # type: ignore[union-attr]
+
+
+def test_a_vehicle_whose_parameters_take_it_beyond_the_forecast_is_not_judged(tmp_path: Path) -> None:
+    begin, end = datetime(2026, 11, 28, 13, 50, tzinfo=UTC), datetime(2026, 11, 28, 14, tzinfo=UTC)
+    for _ in range(2):  # the second one lands as late as the forecast allows
+        hours = [moment.strftime("%Y-%m-%dT%H:%M:%SZ") for moment in (begin, begin + timedelta(seconds=1))]
+        [made] = jobs_of(
+            plan(mission_in_forecast(tmp_path / "f.json", hours, (47.0, 8.02))), {"uav1": "udp:127.0.0.1:9"}
+        )
+        assert made.verdict is not None
+        assert made.verdict.safe is True
+        assert made.verdict.in_wind is not None
+        assert made.verdict.in_wind.window is not None
+        begin = end - timedelta(seconds=math.ceil(made.verdict.in_wind.window.latest_s[-1]) + 2.0)
+    slow = as_assumed(made, LAND_SPEED=20.0)
+    late = refusal(made, slow, allow_parameters=True)
+    assert late is not None
+    assert (late.code, late.data["why"].code) == ("not_judged_on_board", "flies_beyond_forecast")  # type: ignore[union-attr]
+    early = replace(made, waits_s=-600.0)
+    assert refusal(early, slow, allow_parameters=True) is None
