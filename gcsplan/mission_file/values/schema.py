@@ -57,19 +57,22 @@ def _count(value: Any) -> str:
     return "several" if isinstance(value, list) else "one"
 
 
-def _same(speed_m_s: float) -> list[float]:
-    return [speed_m_s, speed_m_s]
+def _same(value: float) -> list[float]:
+    return [value, value]
+
+
+def _one_or_range(kind: Any) -> Any:
+    """A number, which becomes two, or a list of two."""
+    one = Annotated[kind, AfterValidator(_same), Tag("one")]
+    several = Annotated[list[kind], Field(min_length=2, max_length=2), Tag("several")]
+    return Annotated[one | several, Discriminator(_count)]
 
 
 MetrePair = Annotated[list[FiniteMetres], Field(min_length=2, max_length=2)]
-if TYPE_CHECKING:  # one speed becomes two
+if TYPE_CHECKING:
     SpeedRange = list[float]
 else:
-    SpeedRange = Annotated[
-        Annotated[Speed, AfterValidator(_same), Tag("one")]
-        | Annotated[list[Speed], Field(min_length=2, max_length=2), Tag("several")],
-        Discriminator(_count),
-    ]
+    SpeedRange = _one_or_range(Speed)
 
 
 def _speeds_with_error(value: Any) -> Any:
@@ -103,23 +106,18 @@ def _number_range_or_text(most: float, example: str) -> WithJsonSchema:
     return WithJsonSchema({"anyOf": [number, pair, {"type": "string", "examples": [example]}]})
 
 
-if TYPE_CHECKING:  # one number becomes two
+if TYPE_CHECKING:
     WindSpeeds = list[float]
     WindDirections = list[float]
 else:
     _WindSpeed = Annotated[float, Field(ge=0.0, le=MOST_DECLARED_M_S)]
     _Bearing = Annotated[float, Field(ge=0.0, le=360.0)]
-
-    def _one_or_range(kind: Any) -> Any:
-        one = Annotated[kind, AfterValidator(_same), Tag("one")]
-        return one | Annotated[list[kind], Field(min_length=2, max_length=2), Tag("several")]
-
     WindSpeeds = Annotated[
-        Annotated[_one_or_range(_WindSpeed), Discriminator(_count)],
+        _one_or_range(_WindSpeed),
         BeforeValidator(_speeds_with_error), AfterValidator(_rising), _number_range_or_text(MOST_DECLARED_M_S, "5 ± 2"),
     ]  # fmt: skip
     WindDirections = Annotated[
-        Annotated[_one_or_range(_Bearing), Discriminator(_count)],
+        _one_or_range(_Bearing),
         BeforeValidator(_directions_with_error), AfterValidator(_clockwise), _number_range_or_text(360.0, "270 ± 20"),
     ]  # fmt: skip
 POINT_FORM_NAMES = ("[lat, lon]", "text", *POINT_FORMS, "one", "several")
