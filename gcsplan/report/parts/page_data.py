@@ -22,7 +22,7 @@ from gcsplan.mavlink.mission.parameter_list import Setting
 from gcsplan.notes.note import Note, Wording
 from gcsplan.report.parts.html import esc
 from gcsplan.report.parts.track_samples import MOST_SAMPLES
-from gcsplan.units import METRIC, Units
+from gcsplan.units import METRIC, Units, span
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.geodesy.daylight import Daylight
 from gcsplan.world.world import World
@@ -84,6 +84,10 @@ class Subject:
     def window_s(self) -> tuple[float, float] | None:
         """The earliest and latest arrival in the declared winds, counted as `arrive_s`; None in still air."""
         return self.verdict.arrive_window_s(self.slot)
+
+    def window_words(self, decimals: int) -> str:
+        """The window behind the arrival, in brackets; empty in still air."""
+        return "" if self.window_s is None else f" ({span(self.window_s, decimals)} in the wind)"
 
     @property
     def homeless(self) -> bool:

@@ -11,10 +11,10 @@ import numpy as np
 from gcsplan.arrays import Floats
 from gcsplan.fleet.motion.timing import TimedPath
 from gcsplan.report.parts.html import Mark, esc, least, num, stated, table, tools
-from gcsplan.report.parts.page_data import Page, Subject, only_some
+from gcsplan.report.parts.page_data import Page, only_some
 from gcsplan.report.views.chart import Axes, chart_html
 from gcsplan.report.views.plan import COLOURS
-from gcsplan.units import duration, span
+from gcsplan.units import duration
 
 INSTANTS = 600
 MOST_PAIRS = 6
@@ -128,7 +128,7 @@ def _schedule(page: Page, motions: Sequence[tuple[int, TimedPath]]) -> str:
                 f'<i class="swatch t{i % COLOURS}"></i>{esc(motion.name)}', str(order.get(motion.name, "–")),
                 duration(motion.begin_s, 1), duration(slot.hold_s if slot else None),
                 num(slot.speed_m_s if slot else None, 2, page.units.speed),
-                duration(motion.arrive_s, 1) + _window(page.subjects[i], 1),
+                duration(motion.arrive_s, 1) + page.subjects[i].window_words(1),
                 "in the air" if motion.ends_in_air else duration(motion.end_s, 1),
                 num(float(flown_m(motion, np.array([motion.end_s]))[0]), 0, page.units.path),
             )
@@ -145,11 +145,6 @@ def _schedule(page: Page, motions: Sequence[tuple[int, TimedPath]]) -> str:
     )
     of = [i for i, _ in sorted(motions, key=lambda m: m[1].arrive_s)]
     return table("Schedule: times since the fleet's common start, h:mm:ss", head, rows, numbers=of)
-
-
-def _window(subject: Subject, decimals: int) -> str:
-    """The window of the arrival, in brackets; empty in still air."""
-    return "" if subject.window_s is None else f" ({span(subject.window_s, decimals)} in the wind)"
 
 
 def separation_words(page: Page) -> str:

@@ -29,7 +29,7 @@ from gcsplan.report.parts.page_data import Compared, Page, Subject
 from gcsplan.report.parts.track_samples import Passage, TrackLine
 from gcsplan.report.views.plan import COLOURS, zone_heights
 from gcsplan.report.views.profile import passed
-from gcsplan.units import KILOJOULE, Unit, Units, duration, in_units, span
+from gcsplan.units import KILOJOULE, Unit, Units, duration, in_units
 from gcsplan.world.terrain.model_words import what_is_not_in
 
 MOST_DIFFERENCES = 30
@@ -55,8 +55,7 @@ def vehicles_table(page: Page, verdicts: Sequence[str]) -> str:
                 steepest(verdict.max_climb_deg),
                 energy(verdict.reported_j(verdict.energy_j), 0, s.vehicle.energy.battery_v) + esc(verdict.energy_mark),
                 num(verdict.battery_used_percent, 1, "%"),
-                duration(s.arrive_s, page.time_decimals)
-                + ("" if s.window_s is None else f" ({span(s.window_s, page.time_decimals)} in the wind)"), home,
+                duration(s.arrive_s, page.time_decimals) + s.window_words(page.time_decimals), home,
             )
         )  # fmt: skip
         marks.append("bad" if verdict.safe is False else "close" if verdict.safe is None or s.homeless else "")
