@@ -10,13 +10,14 @@ import logging
 import math
 import os
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from datetime import datetime
 from functools import partial
 from itertools import chain
 from typing import Any, get_args
 
-from gcsplan.errors import InputError, Mistake, UsageError, elements, heed_cancel, require_kind, wrong_argument
+from gcsplan.errors import InputError, Mistake, elements, heed_cancel, require_kind, wrong_argument
 from gcsplan.mavlink.mission.mission import AltitudeFrame
 from gcsplan.mission_file.changes import MissionChange, changed
 from gcsplan.mission_file.kept import KeptWorld, ReadZones
@@ -195,16 +196,11 @@ def load_mission(
 def _places(around: Any) -> tuple[tuple[float, float], ...]:
     """The places of ``around``. Raises UsageError."""
     expected = "places as pairs of latitude and longitude in degrees"
-    try:
-        found = tuple(
-            (float(lat), float(lon)) for lat, lon in elements("load_mission()", "around", around, object, expected)
-        )
+    pairs = elements("load_mission()", "around", around, object, expected)
+    with suppress(Exception):  # a stranger's numbers
+        found = tuple((float(lat), float(lon)) for lat, lon in pairs)
         if all(map(math.isfinite, chain.from_iterable(found))):
             return found
-    except UsageError:
-        raise
-    except Exception as why:  # a stranger's numbers
-        raise wrong_argument("load_mission()", "around", around, expected) from why
     raise wrong_argument("load_mission()", "around", around, expected)
 
 

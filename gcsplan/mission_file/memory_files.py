@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from itertools import count
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -20,6 +20,8 @@ from gcsplan.errors import InputError, raised
 from gcsplan.world.terrain.raster import MAX_CELLS, missing, require_numbers
 
 __all__ = ["copied", "geojson_bytes", "with_rasters", "with_zones"]
+
+Made = TypeVar("Made")
 
 GEOJSON = frozenset(
     {
@@ -93,12 +95,14 @@ def with_zones(zones: Any, where: str, held: dict[str, bytes]) -> Any:
     return out
 
 
-def copied(where: str, make: Callable[..., bytes], *given: Any) -> bytes:
+def copied(where: str, make: Callable[..., Made], *given: Any) -> Made:
     """What ``make`` makes of a stranger's object, whose methods may raise anything. Raises InputError."""
     try:
         return make(*given)
     except InputError as why:
-        raise InputError(why.message, where=why.where or where) from why
+        if why.where:
+            raise
+        raise InputError(why.message, where=where) from why
     except Exception as why:
         raise InputError(f"cannot be read: {raised(why)}", where=where) from why
 

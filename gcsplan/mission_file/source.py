@@ -15,8 +15,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from gcsplan.errors import PATH_KINDS, InputError, UsageError, raised, require_kind, wrong_argument
-from gcsplan.mission_file.memory_files import with_rasters, with_zones
+from gcsplan.errors import PATH_KINDS, InputError, UsageError, require_kind, wrong_argument
+from gcsplan.mission_file.memory_files import copied, with_rasters, with_zones
 from gcsplan.mission_file.values.schema import nearest, shown, text_keys
 from gcsplan.mission_file.values.yaml import (
     MAX_YAML_BYTES,
@@ -170,12 +170,7 @@ class _Plain:
     def of(self, value: Any, where: str, depth: int, key: str = "") -> Any:
         """``value`` of ``key`` at ``where``, which is ``depth`` levels deep. Raises InputError, also for what the
         value's own methods raise."""
-        try:
-            return self._of(value, where, depth, key)
-        except InputError:
-            raise
-        except Exception as why:
-            raise InputError(f"cannot be read: {raised(why)}", where=where) from why
+        return copied(where, self._of, value, where, depth, key)
 
     def _of(self, value: Any, where: str, depth: int, key: str) -> Any:
         self._values += 1
