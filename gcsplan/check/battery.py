@@ -106,8 +106,8 @@ def battery_home(verdict: Verdict, vehicle: Vehicle, home: Place, return_amsl_m:
     usable = (1.0 - energy.reserve) * energy.battery_j
     ways = None
     if verdict.in_wind is not None:
-        highest_m = max(return_amsl_m, *(leg.end[2] for leg in verdict.legs))
-        ways = WaysHome(vehicle, verdict.in_wind.flies_in, (home[2], max(home[2], highest_m)))
+        highest_m = max(home[2], return_amsl_m, *(leg.end[2] for leg in verdict.legs))
+        ways = WaysHome(vehicle, verdict.in_wind.flies_in, (home[2], highest_m))
 
     def back_j(at: Place, speed_m_s: float, stands: bool) -> float:
         level = rule.level_amsl_m(return_amsl_m, at[2])

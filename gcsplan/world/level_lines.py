@@ -144,6 +144,7 @@ def over(
     found: list[tuple[Indices, Floats, Floats, Floats]] = []
     look = _pieces if step_m == 0.0 else partial(_steps, step_m)
     for first, last in pairwise(batches(air, starts, ends, MOST_LEVEL_ROWS, step_m)):
+        heed_cancel()
         line, s0, (below, high, beside) = look(
             air, starts[first:last], ends[first:last],
             (
@@ -231,7 +232,6 @@ def _pieces(
     where it is not known; any number for a reach that is `UNUSED`. Both surfaces are the ground unless ``of_top``.
     Every other line is followed backwards, so that one track covers all of them: out, home, out again.
     """
-    heed_cancel()
     n = len(starts)
     still = np.hypot(*(ends - starts).T) == 0.0
     if still.any():  # the kernel takes no line of no length: 0.1 mm instead

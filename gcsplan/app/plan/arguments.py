@@ -12,6 +12,12 @@ from gcsplan.errors import PATH_KINDS, require_kind
 
 __all__ = ["require"]
 
+FLAGS = (
+    "leave_out", "report", "way_home", "atomic", "offline", "allow_unjudged", "allow_armed", "allow_parameters",
+    "ignore_position",
+)  # fmt: skip
+NUMBERS = ("wind_m_s", "gusts_m_s", "noise_m", "from_deg", "tolerance_m", "radius_km", "flat_m", "min_agl_m")
+
 EXPECTED: dict[str, tuple[Any, str]] = {
     "planner": ((str, Callable), "the name of a planner (`gcsplan planners` lists them), or a function that plans"),
     "objective": (str, "'length' or 'energy'"),
@@ -22,43 +28,27 @@ EXPECTED: dict[str, tuple[Any, str]] = {
     "on_path": (Callable, "a function"),
     "on_bound": (Callable, "a function"),
     "jobs": (Integral, "a number of processes"),
-    "leave_out": (bool, "True or False"),
     "planned": (Plan, "a plan, as gcsplan.plan returns it"),
     "folder": (PATH_KINDS, "the path of a folder"),
     "file": (PATH_KINDS, "the path of a file"),
     "what": (PATH_KINDS, "a plan, a mission, or the path of a .waypoints or .plan file"),
     "vehicle": (str, "the name of a vehicle"),
-    "report": (bool, "True or False"),
-    "way_home": (bool, "True or False"),
-    "allow_unjudged": (bool, "True or False"),
-    "allow_armed": (bool, "True or False"),
-    "allow_parameters": (bool, "True or False"),
-    "ignore_position": (bool, "True or False"),
-    "offline": (bool, "True or False"),
     "mirror": (str, "the URL of a mirror"),
-    "atomic": (bool, "True or False"),
-    "units": (str, "the name of a system of units: metric, imperial or aviation"),
     "vertical_datum": (str, "the name of a vertical datum, such as 'EGM96'"),
     "autopilot": (str, "the name of an autopilot, such as 'arducopter'"),
     "runs": (Integral, "a whole number"),
-    "wind_m_s": (Real, "a number"),
-    "gusts_m_s": (Real, "a number"),
-    "noise_m": (Real, "a number"),
-    "from_deg": (Real, "a number"),
     "timeout_s": (Real, "a number of seconds"),
     "to": ((str, list, tuple, Mapping), "a URL, a list of NAME=URL, or a mapping from name to URL"),
     "url": (str, "a URL"),
     "sysid": (Integral, "the number of a vehicle, 1 to 255"),
-    "tolerance_m": (Real, "a number"),
-    "radius_km": (Real, "a number"),
     "around": (str, "a place, such as '36.6, -84.38'"),
     "tiles": (str, "names of tiles with commas, such as 'N36W085,N36W084'"),
     "source": (str, "the name of a published source"),
     "start": (str, "a place, such as '36.6, -84.38'"),
     "goal": (str, "a place, such as '36.6, -84.38'"),
-    "flat_m": (Real, "a number"),
-    "min_agl_m": (Real, "a number"),
     "kind": (str, "'mission', 'fence' or 'rally'"),
+    **dict.fromkeys(FLAGS, (bool, "True or False")),
+    **dict.fromkeys(NUMBERS, (Real, "a number")),
 }
 """The type of each argument by its name, and what it is in words."""
 
