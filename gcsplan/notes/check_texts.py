@@ -555,6 +555,10 @@ CHECK_TEXTS = {
     # -- notes, and what is not judged -------------------------------------------------------------------------------
     "mission_not_followed": "the mission could not be followed",
     "home_not_on_ground": "the ground at home is unknown: give terrain that knows it, or another home",
+    "return_too_windy": (
+        "the declared winds reach {wind_m_s:speed.1 up} at heights of the return{gusts}, and the vehicle does not "
+        "advance against them: return lower, or fly in less wind"
+    ),
     "px4_joins_unread": (
         "PX4's returns along the mission (RTL_TYPE above 0) are not judged: only its return straight home is"
     ),

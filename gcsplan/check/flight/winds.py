@@ -341,12 +341,15 @@ class FlightInWind:
 class WaysHome:
     """What straight ways home take at most, in any wind of a set, between two altitudes ``amsl_m``.
 
+    ``agl_m``: no way is higher above ground.
     The metres through the air and the seconds of a way are convex in the way over ground, with any wind. They are known
     in some directions; between two of these they are no more than in proportion, which is convex too.
     """
 
-    def __init__(self, vehicle: Vehicle, wind: FlightWind, amsl_m: tuple[float, float]) -> None:
-        self._vehicle, self._wind, self._amsl_m = vehicle, wind, amsl_m
+    def __init__(
+        self, vehicle: Vehicle, wind: FlightWind, amsl_m: tuple[float, float], agl_m: float = math.inf
+    ) -> None:  # fmt: skip
+        self._vehicle, self._wind, self._amsl_m, self._agl_m = vehicle, wind, amsl_m, agl_m
         self._costs: dict[float, tuple[list[float], list[float]]] = {}
         self.wind_m_s = float(self._winds(1.0).strongest_m_s(cover(wind.declared)).max())
         """The highest speed of the wind."""
@@ -365,6 +368,12 @@ class WaysHome:
             for c in (air, seconds)
         )
         return air_m, took_s * speed_m_s
+
+    def advances(self, speed_m_s: float) -> bool:
+        """Whether the vehicle advances in every direction, in every wind of the set with its gusts."""
+        declared = self._wind.declared
+        slow, _ = self._winds(speed_m_s).speeds_m_s(cover(declared), declared.gusts_add_m_s)
+        return bool((slow >= ADVANCES_M_S).all())
 
     def worst(self, speed_m_s: float) -> tuple[float, float]:
         """Metres through the air and seconds of a metre in the worst direction."""
@@ -388,7 +397,8 @@ class WaysHome:
         ability = Ability(np.column_stack([np.cos(angle), np.sin(angle)]), none, least, most, bound)
         departs_s = self._wind.departs_s[0]
         return _probes(
-            self._wind.declared, ability, one * self._amsl_m, one * [0.0, math.inf], one * [departs_s, math.inf]
+            self._wind.declared, ability, one * self._amsl_m, np.tile([0.0, self._agl_m], (_RAYS, 1)),
+            one * [departs_s, math.inf],
         )  # fmt: skip
 
 

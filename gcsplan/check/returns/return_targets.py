@@ -210,6 +210,7 @@ class _Finder:
         return None
 
     def _energy_j(self, stretches: Sequence[Stretch]) -> float:
+        """The energy from a join to the end, J; inf if a declared wind is too strong for that."""
         energy, times = self.vehicle.energy, np.full(len(stretches), math.nan)
         air_m = np.array([flat_m(s.start, s.end) for s in stretches])
         hold_s, wind_m_s = np.array([s.hold_s for s in stretches]), np.zeros(len(stretches))
@@ -219,7 +220,10 @@ class _Finder:
             times = clock.seconds()
             if self.wind is not None:
                 unknown = np.full((len(stretches), 2), math.nan)
-                costs = FlightInWind(stretches, clock, self.vehicle, self.wind, unknown).costs
+                blown = FlightInWind(stretches, clock, self.vehicle, self.wind, unknown)
+                if blown.too_windy is not None:
+                    return math.inf
+                costs = blown.costs
                 air_m, times, hold_s, wind_m_s = costs.air_m, costs.seconds, costs.hold_s, costs.wind_m_s
         rise_m = [abs(s.end[2] - s.start[2]) for s in stretches]
         rows = zip(rise_m, air_m.tolist(), times.tolist(), hold_s.tolist(), wind_m_s.tolist(), strict=True)

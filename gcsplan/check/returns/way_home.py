@@ -28,10 +28,11 @@ from gcsplan.arrays import Floats
 from gcsplan.check.battery import battery_home
 from gcsplan.check.flight.corners import round_corners
 from gcsplan.check.flight.follow import follow
+from gcsplan.check.flight.winds import WaysHome
 from gcsplan.check.judge import TERRAIN_ERROR_M
 from gcsplan.check.motion.commands import LAND_STARTS
 from gcsplan.check.motion.project import why_unknown, with_error_of_home
-from gcsplan.check.motion.return_rules import ASIDE_PARTS, RETURN_RULES, at_home_m
+from gcsplan.check.motion.return_rules import ASIDE_PARTS, RETURN_RULES, at_home_m, speed_home_m_s
 from gcsplan.check.motion.stopping import circle_home_m
 from gcsplan.check.motion.stretch import Flight, Place
 from gcsplan.check.returns.along_mission import return_by_mission
@@ -51,6 +52,7 @@ from gcsplan.mavlink.mission.mission import Mission, MissionItem
 from gcsplan.mavlink.mission.return_parameters import ReturnRoute
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Vehicle
+from gcsplan.wind.wording import gusts_note
 from gcsplan.world import level_lines
 from gcsplan.world.world import World
 
@@ -137,6 +139,7 @@ def way_home(
         lowest=lowest_agl(trace, trace.cut(refinement.first_m), target, vehicle, level),
         not_judged=(
             *_but_the_return(flight),
+            *_too_windy(verdict, vehicle, world, (ground, max(level, float(trace.amsl.max())))),
             *(() if route == "straight" else _landing_sequence(mission)),
         ),
         notes=tuple(notes + list(proposal.notes if proposal else ())),
@@ -186,7 +189,8 @@ def _along_mission(
         return replace(home, route="mission", not_judged=(Note("px4_joins_unread"),))
     wind = None if verdict.in_wind is None else verdict.in_wind.flies_in
     joins = joins_of(stored, flight, vehicle, trace.world, wind)
-    known = _but_the_return(flight)
+    heights_m = float(trace.amsl.min()), float(trace.amsl.max())
+    known = [*_but_the_return(flight), *_too_windy(verdict, vehicle, trace.world, heights_m)]
     if joins.why_not:
         return replace(home, route="mission", starts=joins.starts, along_path=joins.path,
                        not_judged=(*joins.why_not, *known))  # fmt: skip
@@ -209,6 +213,18 @@ def _along_mission(
 def _but_the_return(flight: Flight) -> list[Note]:
     """Notes on the parts of a flight that were not judged, but for ArduPlane's own return, which is judged here."""
     return [note for note in flight.not_judged if note.code != "returns_by_itself"]
+
+
+def _too_windy(verdict: Verdict, vehicle: Vehicle, world: World, amsl_m: tuple[float, float]) -> list[Note]:
+    """A note if no return is sure between two altitudes, for a declared wind there is too strong to fly against."""
+    if verdict.in_wind is None:
+        return []
+    agl_m = amsl_m[1] - float(np.nanmin(world.airspace.surface.ground_m))
+    ways = WaysHome(vehicle, verdict.in_wind.flies_in, amsl_m, agl_m)
+    speeds_m_s = {speed_home_m_s(vehicle, leg.speed_m_s) for leg in verdict.legs if not leg.column}
+    if all(ways.advances(speed_m_s) for speed_m_s in speeds_m_s):
+        return []
+    return [Note("return_too_windy", wind_m_s=ways.wind_m_s, gusts=gusts_note(verdict.in_wind.flies_in.declared))]
 
 
 def refinement_of(trace: MissionTrace, target: Target, vehicle: Vehicle, level: float) -> Refinement:

@@ -111,3 +111,20 @@ def test_a_path_back_keeps_the_descent_limit_where_the_way_out_climbs() -> None:
     done = plan(load_mission(Path("hill.yaml"), text=yaml.safe_dump(asked)))
     assert done.vehicles[0].verdict.safe is True, done.vehicles[0].verdict.describe()
     assert done.vehicles[0].verdict.max_climb_deg <= 12.0 + 1e-6
+
+
+def test_a_return_into_a_wind_that_is_too_strong_at_its_height_is_not_safe() -> None:
+    calm_below = [{"agl_m": 60, "speed_m_s": 3, "from_deg": 90}, {"agl_m": 100, "speed_m_s": 20, "from_deg": 270}]
+    vehicle = {
+        "name": "uav1", "sysid": 1, "autopilot": "arducopter", "speed_m_s": 10, "start": [47.0, 8.01],
+        "goal": [47.0, 8.02],
+    }  # fmt: skip
+    for return_m, safe in ((110, None), (50, True)):
+        planned = plan(load_mission({
+            "version": 1, "terrain": {"flat_m": 100}, "limits": {"min_agl_m": 30, "max_agl_m": 120},
+            "wind": {"levels": calm_below}, "vehicles": [vehicle | {"rtl_rel_home_m": return_m}],
+        }))  # fmt: skip
+        home = homes_of(planned)["uav1"]
+        assert planned.vehicles[0].verdict.safe is True
+        assert home.safe is safe
+        assert ("return_too_windy" in [note.code for note in home.not_judged]) == (safe is None)
