@@ -253,8 +253,8 @@ class MapSession:
 
         self._planning_live, self._owed = live, not live
         try:
-            if self._superseded and not live:
-                return  # what is owed, comes after the message that waits
+            if self._held is not None or (self._superseded and not live):
+                return  # a message waits behind the drag, or what is owed comes after it
             plan = planner.plan(dict(edits.live) if live else None, on_path=on_path, on_bound=on_bound)
             self._planning_live = None
             self._send_plan(n, plan, time.perf_counter() - begun_s)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import queue
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -137,6 +138,27 @@ def test_a_drop_is_one_step_that_undo_takes_back_and_redo_makes(desk: Desk) -> N
     state = desk.ask("undo", "state")
     assert (state["undo"], state["redo"], state["saved"]) == (False, True, True)
     assert desk.ask("redo", "state")["vehicles"][0]["goal"] == [46.513, 8.51]
+
+
+def test_a_drop_behind_a_drag_is_planned_without_the_path_of_the_drag(desk: Desk) -> None:
+    desk.ask("hello", "home")
+    heard: queue.Queue[dict[str, Any]] = queue.Queue()
+    together = threading.Event()
+
+    def hear(answer: dict[str, Any]) -> None:
+        together.wait(ANSWER_S)  # the session takes what follows when all of it waits
+        heard.put(answer)
+
+    desk.session.attach(hear)
+    desk.send("place", text="46.5, 8.5")
+    desk.send("change", changes={GOAL: [46.52, 8.51]}, live=True)
+    desk.send("change", changes={GOAL: [46.513, 8.51]})
+    together.set()
+    answers = [heard.get(timeout=ANSWER_S)]
+    while answers[-1]["type"] != "plan":
+        answers.append(heard.get(timeout=ANSWER_S))
+    assert answers[-1]["n"] == desk.n
+    assert not [a for a in answers if a["type"] == "path" and a["live"]]
 
 
 def test_a_page_that_comes_again_in_a_drag_gets_the_certificate_of_the_document(desk: Desk) -> None:
