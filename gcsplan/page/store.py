@@ -27,8 +27,8 @@ Disk = Literal["same", "changed", "gone"]
 UNNAMED_FILE = "mission.yaml"
 """The name of a mission that has no file yet."""
 
-EDITS = ".{}.edits"
-"""The file of unsaved edits, by the name of the mission's."""
+EDITS, UNNAMED_EDITS = ".{}.edits", ".unnamed.edits"
+"""The files of unsaved edits: by the name of the mission's file, and of a mission that has no file yet."""
 
 MOST_EDITS_BYTES = 4 * MAX_YAML_BYTES
 """Most bytes of a file of edits that is read: JSON of the largest mission."""
@@ -59,7 +59,7 @@ class MissionStore:
     @property
     def edits(self) -> Path:
         """The file of unsaved edits."""
-        return self.place.with_name(EDITS.format(self.place.name))
+        return self.folder / UNNAMED_EDITS if self.file is None else self.file.with_name(EDITS.format(self.file.name))
 
     def disk(self) -> Disk | None:
         """Whether the file is still what was read or written here; None without a file."""

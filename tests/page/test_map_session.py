@@ -304,6 +304,21 @@ def test_edits_of_another_state_of_the_file_are_not_written_over_it(file: Path) 
         assert again.ask("save", "error")["code"] == "changed_on_disk"
 
 
+def test_a_mission_from_nothing_leaves_the_kept_edits_of_a_file_alone(tmp_path: Path) -> None:
+    (tmp_path / "mission.yaml").write_text(FLAT)
+    with desk_of(tmp_path / "mission.yaml", tmp_path) as desk:
+        desk.ask("change", "state", changes={GOAL: [46.515, 8.51]})
+    kept = tmp_path / ".mission.yaml.edits"
+    before = kept.read_bytes()
+    with desk_of(None, tmp_path) as desk:
+        assert desk.ask("hello", "state")["stage"] == "empty"
+        ends = {"start": [46.5, 8.5], "goal": [46.51, 8.5]}
+        desk.ask("new", "state", terrain={"flat_m": 400}, preset="copter", max_agl_m=120, **ends)
+    assert kept.read_bytes() == before
+    with desk_of(None, tmp_path) as desk:
+        assert desk.ask("hello", "state")["restored"] is True
+
+
 def test_a_mission_begins_from_nothing_by_clicks_alone(tmp_path: Path) -> None:
     with desk_of(None, tmp_path) as desk:
         state = desk.ask("hello", "state")
