@@ -50,10 +50,10 @@ def write_geojson(name: str, tracks: Sequence[FlownTrack], zones: Sequence[Zone]
     no_fly = no_fly_of(zones)
     for zone, ring in zip(no_fly, outlines_deg(no_fly, frame), strict=True):
         about = {"kind": "no_fly", "name": zone.name, **_levels(zone)}
-        features.append(_feature(_area(ring), about))
+        features.append(_feature(area_geometry([ring]), about))
     for area, rings in areas_deg(keep_in_of(zones), frame):
         about = {"kind": "keep_in", "name": area.name, **_levels(area)}
-        features.append(_feature(_area(rings[0]) if len(rings) == 1 else _with_holes(rings), about))
+        features.append(_feature(area_geometry(rings) if len(rings) == 1 else _with_holes(rings), about))
     document = {
         "type": "FeatureCollection",
         "name": name,
@@ -134,16 +134,18 @@ def _turn(lon_deg: float, towards_deg: float) -> int:
     return turn - 1 if on_seam and towards_deg < lon_deg else turn
 
 
-def _area(ring: Floats) -> dict[str, Any]:
-    points = np.stack([_unwrapped(np.append(ring[:, 1], ring[0, 1]))[:-1], ring[:, 0]], axis=-1)
-    low, high = points[:, 0].min(), points[:, 0].max()
+def area_geometry(rings: Sequence[Floats]) -> dict[str, Any]:
+    """The areas in rings, (N, 2) each, latitude and longitude; one that crosses the antimeridian is cut there."""
     polygons = []
-    for turn in range(_turn(low, high), _turn(high, low) + 1):
-        west, east = 360.0 * turn - 180.0, 360.0 * turn + 180.0
-        part = _clip(_clip(points, west, keep_east=True), east, keep_east=False)
-        corners = [[round(lon, 7), round(lat, 7)] for lon, lat in (part - (360.0 * turn, 0.0)).tolist()]
-        if len({lon for lon, _ in corners}) >= 2:  # leave out parts without width at the seam
-            polygons.append([[*corners, corners[0]]])
+    for ring in rings:
+        points = np.stack([_unwrapped(np.append(ring[:, 1], ring[0, 1]))[:-1], ring[:, 0]], axis=-1)
+        low, high = points[:, 0].min(), points[:, 0].max()
+        for turn in range(_turn(low, high), _turn(high, low) + 1):
+            west, east = 360.0 * turn - 180.0, 360.0 * turn + 180.0
+            part = _clip(_clip(points, west, keep_east=True), east, keep_east=False)
+            corners = [[round(lon, 7), round(lat, 7)] for lon, lat in (part - (360.0 * turn, 0.0)).tolist()]
+            if len({lon for lon, _ in corners}) >= 2:  # leave out parts without width at the seam
+                polygons.append([[*corners, corners[0]]])
     if len(polygons) == 1:
         return {"type": "Polygon", "coordinates": polygons[0]}
     return {"type": "MultiPolygon", "coordinates": polygons}

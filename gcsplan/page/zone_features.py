@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
+from gcsplan.export.geojson import area_geometry
 from gcsplan.export.rows import outlines_deg
 from gcsplan.mission_file.zones.draft import ZoneDraft, place_zones
 from gcsplan.page.history import EditedDocument
@@ -38,7 +38,7 @@ def zones_geojson(
         rings = outlines_deg(zones, plane)
         if rings:
             about = _about(key, entry_of(document, key), draft, zone_heights(zones[0], units))
-            features.append({"type": "Feature", "geometry": _geometry(rings), "properties": about})
+            features.append({"type": "Feature", "geometry": area_geometry(rings), "properties": about})
     return {"type": "FeatureCollection", "features": features}
 
 
@@ -46,13 +46,6 @@ def _middle(draft: ZoneDraft) -> tuple[float, float]:
     lat = [p[0] for p in draft.points]
     lon = [p[1] for p in draft.points]
     return 0.5 * (min(lat) + max(lat)), (0.5 * (min(lon) + max(lon)) + 180.0) % 360.0 - 180.0
-
-
-def _geometry(rings: Sequence[Floats]) -> dict[str, Any]:
-    closed = [[[[round(lon, 7), round(lat, 7)] for lat, lon in [*ring.tolist(), ring[0].tolist()]]] for ring in rings]
-    if len(closed) == 1:
-        return {"type": "Polygon", "coordinates": closed[0]}
-    return {"type": "MultiPolygon", "coordinates": closed}
 
 
 def entry_of(document: EditedDocument, key: str) -> Any:

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from gcsplan.mission_file.kept import KeptWorld
@@ -115,6 +116,16 @@ def test_zones_are_drawn_although_others_are_wrong(tmp_path: Path) -> None:
     assert (about["all"]["kind"], about["all"]["editable"]) == ("keep_in", True)
     assert about["line"]["editable"] is False
     assert zones_geojson({}, {}, None, METRIC)["features"] == []
+
+
+def test_a_zone_over_the_antimeridian_is_cut_there_for_the_map(tmp_path: Path) -> None:
+    document = {"no_fly": [{"name": "atoll", "center": [-17.0, 179.999], "radius_m": 900}]}
+    entries = zones_by_entry(Content(tmp_path / "m.yaml", "m.yaml", document, None), KeptWorld())
+    [feature] = zones_geojson(document, entries, None, METRIC)["features"]
+    assert feature["geometry"]["type"] == "MultiPolygon"
+    spans = [np.ptp([lon for lon, _ in outline]) for [outline] in feature["geometry"]["coordinates"]]
+    assert len(spans) == 2
+    assert max(spans) < 0.02
 
 
 def test_kept_edits_that_are_no_mission_are_left_alone(tmp_path: Path) -> None:
