@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 import yaml
 
+from gcsplan.bench.measure import percentile, resident_mb
 from gcsplan.bench.sample import SAMPLE_HALF_M, SAMPLE_MIDDLE_DEG, SAMPLE_TERRAIN
 from gcsplan.bench.session import SESSION_ZONES, degree_terrain, drawn_mission
 from gcsplan.units import METRIC
@@ -180,7 +181,7 @@ class _Times:
     def quantiles(self, name: str) -> dict[str, float | None]:
         """The median, and the value that one in ten is above; None without answers."""
         return {
-            f"{name}_p{q}{end}": float(np.quantile(times, q / 100)) if times else None
+            f"{name}_p{q}{end}": percentile(times, q)
             for end, times in (("_ms", self.clock_ms), ("_processor_ms", self.processor_ms))
             for q in (50, 90)
         }
@@ -198,21 +199,12 @@ def _memory(page: _Client, middle: tuple[float, float], moves: int, rng: np.rand
     tracemalloc.start()
     move(2 * DRAG_PLACES)  # with all that is kept from one plan to the next
     gc.collect()
-    before, resident = tracemalloc.get_traced_memory()[0], _resident_bytes()
+    before, resident = tracemalloc.get_traced_memory()[0], resident_mb()
     move(moves)
     gc.collect()
     grown = tracemalloc.get_traced_memory()[0] - before
     tracemalloc.stop()
-    return {"moves": moves, "grown_bytes": grown, "resident_grown_bytes": _resident_bytes() - resident}
-
-
-def _resident_bytes() -> int:
-    """Resident memory of this process; 0 where the system does not say."""
-    try:
-        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
-    except (OSError, ValueError):
-        return 0
-    return pages * 4096
+    return {"moves": moves, "grown_bytes": grown, "resident_grown_bytes": (resident_mb() - resident) * 2**20}
 
 
 def _written(terrain: dict[str, Any], folder: Path) -> dict[str, Any]:

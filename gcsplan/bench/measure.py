@@ -131,9 +131,14 @@ class Memory:
         self.peak_mb = None if before is None or most is None else max(0.0, (most - before) / 1024.0)
 
 
-def _status_kb(key: str) -> float | None:
+def resident_mb(pid: int | None = None) -> float:
+    """Resident memory of the process ``pid`` (None: this one), MB; 0 where the system does not say."""
+    return (_status_kb("VmRSS", pid) or 0.0) / 1024.0
+
+
+def _status_kb(key: str, pid: int | None = None) -> float | None:
     with contextlib.suppress(OSError):
-        for line in Path("/proc/self/status").read_text(encoding="ascii", errors="replace").splitlines():
+        for line in Path(f"/proc/{pid or 'self'}/status").read_text(encoding="ascii", errors="replace").splitlines():
             if line.startswith(f"{key}:"):
                 return float(line.split()[1])
     return None

@@ -23,7 +23,7 @@ from gcsplan.app.plan.problem import make_problem
 from gcsplan.bench.everyday.missions import EVERYDAY_KINDS, Everyday, draw
 from gcsplan.bench.everyday.oracle import EnclosedPlace, VisibilityGraph
 from gcsplan.bench.files import write_all
-from gcsplan.bench.measure import Memory, passes, percentile
+from gcsplan.bench.measure import Memory, passes, percentile, resident_mb
 from gcsplan.errors import InputError, NoMission
 from gcsplan.export.table import csv_of
 from gcsplan.mission_file import load_mission
@@ -134,7 +134,7 @@ def measure(one: Everyday, without: Sequence[str] = ()) -> MissionOutcome:
     sender.close()
     found: dict[str, Any] = {"status": "killed"}
     while not receiver.poll(0.05):
-        rss_mb = _resident_mb(child.pid)
+        rss_mb = resident_mb(child.pid)
         if time.perf_counter() - begun > KILL_S or rss_mb > KILL_MB:
             child.kill()
             found |= {"memory_mb": rss_mb, "planning_s": time.perf_counter() - begun}
@@ -174,12 +174,6 @@ def _solve(problem: Problem) -> dict[str, Any]:
         "gap_percent": None if not bound else 100.0 * (cost / bound - 1.0),
         "search": json.dumps([asdict(step) for step in solution.search]),
     }  # fmt: skip
-
-
-def _resident_mb(pid: int | None) -> float:
-    with contextlib.suppress(OSError, ValueError, IndexError):
-        return float(Path(f"/proc/{pid}/statm").read_text(encoding="ascii").split()[1]) * 4096.0 / 2**20
-    return 0.0
 
 
 def line(o: MissionOutcome) -> str:
