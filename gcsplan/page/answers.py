@@ -20,6 +20,7 @@ from gcsplan.errors import GcsplanError, InputError, NoMission
 from gcsplan.notes.note import Wording
 from gcsplan.page.form import cure_changes
 from gcsplan.page.history import EditedDocument
+from gcsplan.planners.problem import gap_percent
 from gcsplan.report.parts.track_samples import TrackLine, line_of
 from gcsplan.units import Joules, Quantity, Seconds, Units, in_units
 from gcsplan.world.geodesy.frame import Frame
@@ -46,11 +47,6 @@ def path_answer(n: int, vehicle: int, found: BetterPath, *, live: bool, first: b
 def bound_answer(n: int, vehicle: int, bound: float, cost: float | None) -> dict[str, Any]:
     """A higher lower bound; the gap to the best path so far."""
     return {"type": "bound", "n": n, "vehicle": vehicle, "bound": bound, "gap_percent": gap_percent(cost, bound)}
-
-
-def gap_percent(cost: float | None, bound: float | None) -> float | None:
-    """How far a path is above its bound, in percent of that; None without either."""
-    return None if not bound or cost is None else max(0.0, 100.0 * (cost / bound - 1.0))
 
 
 def plan_answer(n: int, plan: Plan, homes: Mapping[str, WayHome], units: Units, elapsed_s: float) -> dict[str, Any]:

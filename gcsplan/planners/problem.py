@@ -241,6 +241,13 @@ class Solution:
         return f"<Solution: {len(self.path.points)} points, bound {self.lower_bound}, stopped by {self.stopped_by}>"
 
 
+def gap_percent(cost: float | None, lower_bound: float | None) -> float | None:
+    """How far a path may be above the best one, in percent of the lower bound; None without either."""
+    if cost is None or not lower_bound:
+        return None
+    return max(0.0, 100.0 * (cost / lower_bound - 1.0))  # below by rounding alone
+
+
 PlanFunction = Callable[[Problem], Solution]
 """Finds a path, or raises `Refusal`."""
 

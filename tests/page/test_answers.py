@@ -15,6 +15,7 @@ from gcsplan.app.session import BetterPath
 from gcsplan.check.verdict import LegFigures
 from gcsplan.errors import InputError, Mistake, NoMission
 from gcsplan.page import answers
+from gcsplan.planners.problem import gap_percent
 from gcsplan.units import IMPERIAL, METRIC
 
 MISSION: dict[str, Any] = {
@@ -71,7 +72,7 @@ def test_paths_and_gaps_are_plain_numbers() -> None:
     found = answers.path_answer(1, 0, path, live=True, first=True)
     assert found["line"] == [46.5, 8.5, 150.0, 46.6, 8.6, 160.0]
     assert found["gap_percent"] == pytest.approx(10.0)
-    assert answers.gap_percent(None, 100.0) is answers.gap_percent(100.0, None) is answers.gap_percent(1.0, 0.0) is None
+    assert gap_percent(None, 100.0) is gap_percent(100.0, None) is gap_percent(1.0, 0.0) is None
     assert answers.bound_answer(1, 0, 100.0, 99.9)["gap_percent"] == 0.0
 
 

@@ -17,7 +17,7 @@ from gcsplan.mavlink.build.order import Order
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.mission_file import MissionFile, VehicleRequest
 from gcsplan.notes.note import Note
-from gcsplan.planners.problem import Problem, Solution
+from gcsplan.planners.problem import Problem, Solution, gap_percent
 from gcsplan.planners.registry import get as get_planner
 from gcsplan.planners.registry import own as own_planner
 from gcsplan.world.world import World
@@ -133,8 +133,7 @@ class VehiclePlan:
     @property
     def gap_percent(self) -> float | None:
         """How far the flown path may be above the best one, in percent of the lower bound; None without a bound."""
-        bound = self.solution.lower_bound
-        return None if not bound else max(0.0, 100.0 * (self.cost / bound - 1.0))  # below by rounding alone, see above
+        return gap_percent(self.cost, self.solution.lower_bound)
 
     def packed(self) -> VehiclePlan:
         """The plan without its terrain, for another process; `restored` is the way back."""

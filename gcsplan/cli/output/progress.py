@@ -18,7 +18,7 @@ from rich.text import Text
 from gcsplan.app.parallel.executor import Executor
 from gcsplan.cli.output import console as words
 from gcsplan.cli.output.console import aside, remark
-from gcsplan.planners.problem import Progress
+from gcsplan.planners.problem import Progress, gap_percent
 
 REDRAWN_HZ = 4.0
 """Redraws per second on a terminal."""
@@ -59,8 +59,8 @@ class PlanningBoard:
             parts.append(f"best {words.number(best / self._per_unit)} {self._unit}")
         if bound is not None:
             parts.append(f"bound {words.number(bound / self._per_unit)} {self._unit}")
-        if best is not None and bound:
-            parts.append(f"gap {max(0.0, 100.0 * (best / bound - 1.0)):.2f} %")
+        if (gap := gap_percent(best, bound)) is not None:
+            parts.append(f"gap {gap:.2f} %")
         parts.append(self._notice or self._last.phase)
         return ", ".join(part for part in parts if part)
 
