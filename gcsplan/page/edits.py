@@ -10,6 +10,7 @@ import shlex
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from gcsplan.app.session import Planner
 from gcsplan.dem.cache import Cache
 from gcsplan.dem.sources import SOURCES
 from gcsplan.errors import GcsplanError, InputError
-from gcsplan.mission_file import MissionFile, load_mission
+from gcsplan.mission_file import load_mission
 from gcsplan.mission_file.new_file import Draft, place_text, text_of
 from gcsplan.mission_file.source import is_sample
 from gcsplan.page.form import require_changes
@@ -60,20 +61,21 @@ class Edits:
         sample = is_sample(mission)
         folder = Path() if sample else mission.parent
         edits = cls(MissionStore(folder.absolute(), None if sample else mission.absolute(), source.content.text))
-        edits._begin(source)
+        edits.planner = Planner(source)
         edits._saved = edits.document
         if not sample:
-            edits._restore_kept()
+            edits._restore(edits.store.kept())
         return edits
 
     @classmethod
     def of_folder(cls, folder: Path) -> Edits:
         """No mission yet, but for the unsaved one of an earlier run that has no file."""
         edits = cls(MissionStore(folder.absolute(), None, None))
-        if edits.store.kept() is not None and edits.store.text is not None:
+        kept = edits.store.kept()
+        if kept is not None and edits.store.text is not None:
             with suppress(InputError):
-                edits._begin(load_mission(edits.store.place, text=edits.store.text))
-                edits._restore_kept()
+                edits.planner = Planner(load_mission(edits.store.place, text=edits.store.text))
+                edits._restore(kept)
         return edits
 
     @property
@@ -240,13 +242,10 @@ class Edits:
             ends = replace(self._draft, start=_text(self._ends["start"]), goal=_text(self._ends["goal"]))
             text = text_of(ends, UNNAMED_FILE, Path(UNNAMED_FILE).stem)
             self.store.text = text
-            self._begin(load_mission(self.store.place, text=text))
+            self.planner = Planner(load_mission(self.store.place, text=text))
 
-    def _begin(self, source: MissionFile) -> None:
-        self.planner = Planner(source)
-
-    def _restore_kept(self) -> None:
-        kept = self.store.kept()
+    def _restore(self, kept: EditedDocument | None) -> None:
+        """Take the unsaved edits of an earlier run, which undo takes back."""
         assert self.planner is not None
         if kept is None or kept == self._saved:
             return
@@ -261,8 +260,6 @@ class Edits:
 
 def terrain_choices(folder: Path) -> list[str]:
     """What the page offers as ground: the sample, published sources with tiles in the cache, files of the folder."""
-    from itertools import islice
-
     fetched = [name for name, source in SOURCES.items() if Cache(source).folder.is_dir()]
     try:
         names = sorted(p.name for p in islice(folder.iterdir(), MOST_LOOKED_AT) if p.suffix.lower() in TERRAIN_FILES)
