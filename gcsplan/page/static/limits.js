@@ -12,7 +12,7 @@ export function startLimits() {
 }
 
 function show(state) {
-  const form = state.form || [], keys = JSON.stringify([form.map((f) => [f.key, f.label, f.choices]), state.units.name]);
+  const { form } = state, keys = JSON.stringify([form.map((f) => [f.key, f.label, f.choices]), state.units.name]);
   if (keys !== shown) {
     shown = keys;
     const open = box.querySelector('details')?.open || false;
@@ -20,13 +20,13 @@ function show(state) {
   }
   for (const field of form) fill(field);
   for (const field of form) if (field.error) { box.querySelector('details').open = true; break; }
-  problems(state.problems || [], form);
+  problems(state.problems, form);
 }
 
 const GROUPS = { limits: 'Limits', vehicle: 'Vehicle', planner: 'Search' };
 function groups(form) {
-  const names = [...new Set(form.map((f) => f.group || 'limits'))];
-  return names.map((name) => el('fieldset', {}, el('legend', {}, GROUPS[name] || name), ...form.filter((f) => (f.group || 'limits') === name).map(row)));
+  const names = [...new Set(form.map((f) => f.group))];
+  return names.map((name) => el('fieldset', {}, el('legend', {}, GROUPS[name]), ...form.filter((f) => f.group === name).map(row)));
 }
 
 const size = (field) => (field.quantity ? known.state.units.kinds[field.quantity][1] : 1);
@@ -40,7 +40,7 @@ function row(field) {
     ? el('select', about, ...field.choices.map((c) => el('option', { value: c }, c)))
     : el('input', { ...about, type: field.kind === 'number' ? 'number' : 'text', step: 'any', autocomplete: 'off' });
   return el('div', { class: 'row' }, el('label', { for: name }, field.label), input, el('span', { class: 'unit' }, unit(field)),
-    el('span', { id: `${name}-help`, hidden: true }, field.help || ''),
+    el('span', { id: `${name}-help`, hidden: true }, field.help),
     el('p', { class: 'problem', id: `${name}-problem`, role: 'alert', hidden: true }));
 }
 

@@ -69,7 +69,7 @@ export function moved(from, dx, dy) {
 }
 export const size = () => [map.getCanvas().clientWidth, map.getCanvas().clientHeight];
 
-export function fit() {
+function fit() {
   const { bounds } = known.state;
   if (!bounds) return;
   let [west, south, east, north] = bounds;

@@ -93,7 +93,7 @@ function plan(message) {
   const rest = box.querySelector('#rest');
   rest.classList.remove('old');
   rest.replaceChildren(...message.vehicles.flatMap((v) => ofVehicle(v, message.vehicles.length > 1)),
-    ...[list('Left out', (message.left_out || []).map((l) => `${l.name}: ${l.message}`), true), list('Notes on all', message.notes || [], false)].filter((p) => p));
+    ...[list('Left out', message.left_out.map((l) => `${l.name}: ${l.message}`), true), list('Notes on all', message.notes, false)].filter((p) => p));
   tell('judged', message);
 }
 
@@ -108,7 +108,7 @@ function judged(word, homes, words) {
 function ofVehicle(v, many) {
   const rows = v.figures.filter((f) => f.key !== 'verdict').map(figure);
   if (!v.way_home) rows.push(el('div', { 'data-home': v.vehicle }, el('dt', {}, 'Way home'), el('dd', {}, 'being judged')));
-  return [many ? el('h3', {}, v.name) : null, el('dl', {}, ...rows), list('Findings', v.findings, true), list('Not judged', v.not_judged || [], true),
+  return [many ? el('h3', {}, v.name) : null, el('dl', {}, ...rows), list('Findings', v.findings, true), list('Not judged', v.not_judged, true),
     homeWords(v.vehicle, v.way_home), list('Notes', v.notes, false)].filter((p) => p);
 }
 
@@ -150,7 +150,7 @@ function nothing(words, word) {
 function refused(message) {
   if (!message.live) before = [message];
   nothing(message.message, message.live ? 'No path here' : 'No mission');
-  markPlace(message.at, message.zone || 'here');
+  markPlace(message.at, 'here');
   if (message.live) return;
   const rest = box.querySelector('#rest');
   rest.classList.remove('old');
@@ -160,5 +160,5 @@ function refused(message) {
 }
 
 function cure(given) {
-  return el('div', { class: 'cure' }, button(given.label, () => change(given.changes), { class: 'main' }), given.text ? el('p', { class: 'note' }, given.text) : null);
+  return el('div', { class: 'cure' }, button(given.label, () => change(given.changes), { class: 'main' }));
 }

@@ -95,7 +95,7 @@ function withVia(place) {
   return { ...near, index: before, list: [...near.vehicle.via.slice(0, before), place, ...near.vehicle.via.slice(before)] };
 }
 
-export function insertVia(place) {
+function insertVia(place) {
   const made = withVia(place);
   if (made) changeVia(made.vehicle, made.list);
 }
