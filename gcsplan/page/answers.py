@@ -189,9 +189,9 @@ def _profile(line: TrackLine, frame: Frame) -> dict[str, Any]:
     degrees = frame.to_degrees(line.east_m, line.north_m)
     return {
         "distance_m": _numbers(line.run_m, 1), "lat": _numbers(degrees[:, 0], PLACE_DECIMALS),
-        "lon": _numbers(degrees[:, 1], PLACE_DECIMALS), "ground_m": _numbers(line.ground_m, 1),
-        "lowest_m": _numbers(line.floor_m, 1), "highest_m": _numbers(line.ceiling_m, 1),
-        "path_m": _numbers(line.amsl_m, 1), "time_s": _numbers(line.time_s, 1),
+        "lon": _numbers(degrees[:, 1], PLACE_DECIMALS), "ground_m": _numbers(line.ground_m, HEIGHT_DECIMALS),
+        "lowest_m": _numbers(line.floor_m, HEIGHT_DECIMALS), "highest_m": _numbers(line.ceiling_m, HEIGHT_DECIMALS),
+        "path_m": _numbers(line.amsl_m, HEIGHT_DECIMALS), "time_s": _numbers(line.time_s, 1),
     }  # fmt: skip
 
 

@@ -41,6 +41,15 @@ def test_a_certificate_has_the_plan_s_numbers_and_words_in_units(planned: Plan) 
     assert figures["nearest_zone"]["text"] == "none"
 
 
+def test_a_profile_has_the_height_above_ground_to_a_centimetre() -> None:
+    planned = plan({**MISSION, "terrain": {"flat_m": 100.24}})
+    [found] = answers.plan_answer(1, planned, {}, METRIC, 0.0)["vehicles"]
+    agl_m = np.subtract(found["profile"]["path_m"], found["profile"]["ground_m"])
+    highest = planned.vehicles[0].verdict.highest
+    assert highest is not None
+    assert agl_m.max() == pytest.approx(highest.max_agl_m, abs=0.0101)
+
+
 def test_a_mission_that_breaks_a_limit_is_never_called_safe(planned: Plan) -> None:
     [own] = planned.vehicles
     unjudged = replace(own, verdict=replace(own.verdict, not_judged=own.verdict.notes[:1] or own.all_notes(None)[:1]))
