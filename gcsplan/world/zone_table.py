@@ -86,6 +86,7 @@ class ZoneTable:
     arrays: Zones
     surface: Surface
     _polygons: dict[int, Any] = field(default_factory=dict, init=False, repr=False)
+    _rises: dict[tuple[float, ...], float] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod
     def of(cls, zones: Sequence[Zone], surface: Surface, map_: Field, scale: float) -> ZoneTable:
@@ -247,9 +248,16 @@ class ZoneTable:
         0 if neither floor nor ceiling follows the ground, inf where ground is unknown."""
         if reach_m <= 0.0 or not self.follow_ground[zone]:
             return 0.0
-        grid, own_m = self.surface.grid, self.zones[zone].bounds
+        own_m = self.zones[zone].bounds
         west, south = (max(a, b) - reach_m for a, b in zip(own_m[:2], box_m[:2], strict=True))
         east, north = (min(a, b) + reach_m for a, b in zip(own_m[2:], box_m[2:], strict=True))
+        key = zone, west, south, east, north, reach_m
+        if key not in self._rises:  # a wider lattice holds the same zones
+            self._rises[key] = self._rise_in(west, south, east, north, reach_m)
+        return self._rises[key]
+
+    def _rise_in(self, west: float, south: float, east: float, north: float, reach_m: float) -> float:
+        grid = self.surface.grid
         e, n = np.meshgrid(np.linspace(west, east, 5), np.linspace(south, north, 5))
         at = grid(e.ravel(), n.ravel())
         first = np.maximum(np.floor(at.min(axis=0)).astype(np.intp) - 1, 0)
