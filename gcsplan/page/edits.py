@@ -166,14 +166,11 @@ class Edits:
         """Take the file as it is on the disk; undo leads back to the edits. Raises InputError."""
         if self.planner is None:
             raise PageError("there is no file to read again", code="bad_message")
-        before, text = self.planner.mission, self.store.text
-        try:
-            document = self.store.reread()
-            load_mission(self.store.place, text=self.store.text)
-            self.planner.restore(document)
-        except InputError:
-            self.store.text = text
-            raise
+        before = self.planner.mission
+        document, text = self.store.reread()
+        load_mission(self.store.place, text=text)
+        self.planner.restore(document)
+        self.store.take(text)
         self.planner.reload()
         self._history.step(before)
         self._live.clear()

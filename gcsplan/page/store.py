@@ -74,14 +74,17 @@ class MissionStore:
             self._changed = "same" if _sha256(self.file) == self._sha256 else "changed"
         return self._changed
 
-    def reread(self) -> EditedDocument:
-        """The document that the file holds now. Raises InputError."""
+    def reread(self) -> tuple[EditedDocument, str | None]:
+        """The document and the text that the file holds now; `take` makes them the mission's. Raises InputError."""
         if self.file is None:
             raise PageError("this mission has no file yet: save it first", code="bad_message")
         _, _, document, text, _ = read_content(self.file, None)
+        return document, text
+
+    def take(self, text: str | None) -> None:
+        """Take the text that was read again: the file is the mission's own."""
         self.text = text
         self._look()
-        return document
 
     def save(self, document: EditedDocument, name: str | None, *, over: bool) -> Path:
         """Write the document into its file, or into the one called ``name``; all comments of its text stay.

@@ -250,8 +250,11 @@ def test_a_file_that_is_broken_meanwhile_is_words_and_the_edits_stay(desk: Desk,
     desk.ask("hello", "plan")
     file.write_text("version: [")
     assert desk.ask("reload", "error")["code"] == "bad_mission"
-    file.write_text(FLAT.replace("min_agl_m: 30", "min_agl_m: x"))
+    other = FLAT.replace("min_agl_m: 30", "min_agl_m: x")
+    file.write_text(other)
     assert desk.ask("reload", "error")["code"] == "bad_mission"
+    assert desk.ask("save", "error")["code"] == "changed_on_disk"
+    assert file.read_text() == other
     assert desk.ask("hello", "state")["vehicles"][0]["goal"] == [46.51, 8.51]
 
 
