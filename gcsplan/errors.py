@@ -55,6 +55,11 @@ class Mistake:
     def __str__(self) -> str:
         return f"{self.where}: {self.message}" if self.where else self.message
 
+    @property
+    def key(self) -> str:
+        """Its place within the file."""
+        return self.where.rpartition(": ")[2]
+
     def as_dict(self) -> dict[str, str]:
         """The error as ``--json`` prints it."""
         return {"where": self.where, "message": self.message} | ({"code": self.code} if self.code else {})

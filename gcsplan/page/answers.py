@@ -128,8 +128,8 @@ def refused_answer(n: int, why: NoMission, document: EditedDocument, units: Unit
 def error_answer(n: int, why: GcsplanError, code: str) -> dict[str, Any]:
     """An error in words."""
     problems = why.problems if isinstance(why, InputError) else ()
-    where = problems[0].where.rpartition(": ")[2] if problems else ""
-    words = [str(replace(p, where=p.where.rpartition(": ")[2])) for p in problems[:MOST_ON_PAGE]]
+    where = problems[0].key if problems else ""
+    words = [str(replace(p, where=p.key)) for p in problems[:MOST_ON_PAGE]]
     return {"type": "error", "n": n, "code": code, "message": "\n".join(words) or str(why), "where": where}
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
@@ -116,7 +116,7 @@ def _field(form: FormKey, document: EditedDocument, problems: Sequence[Mistake])
         "kind": "choice" if choices else "text" if form.key == "name" else "number",
         "quantity": None if other else form.quantity, "unit": unit, "value": section.get(name),
         "default": default if isinstance(default, int | float | str) else None, "choices": choices,
-        "error": next((p.message for p in problems if _is_at(p.where.rpartition(": ")[2], place)), None),
+        "error": next((p.message for p in problems if _is_at(p.key, place)), None),
     }  # fmt: skip
 
 
@@ -151,15 +151,12 @@ def _choices(annotation: Any) -> list[str]:
 
 def cure_changes(document: EditedDocument, vehicle: str, cure: LimitValues) -> dict[str, float]:
     """The changes of keys that set the limits of a cure where the document has them."""
-    return dict(_cured(document, vehicle, cure))
-
-
-def _cured(document: EditedDocument, vehicle: str, cure: LimitValues) -> Iterator[tuple[str, float]]:
     vehicles = document.get("vehicles")
     listed = vehicles if isinstance(vehicles, list) else []
     number, own = next(((i, v) for i, v in enumerate(listed) if isinstance(v, dict) and v.get("name") == vehicle),
                        (0, {}))  # fmt: skip
     own_limits = own.get("limits") if isinstance(own.get("limits"), dict) else {}
+    found: dict[str, float] = {}
     for key, value in cure:
         for where, section in ((f"vehicles[{number}]", own), (f"vehicles[{number}].limits", own_limits),
                                ("limits", None)):  # fmt: skip
@@ -167,5 +164,6 @@ def _cured(document: EditedDocument, vehicle: str, cure: LimitValues) -> Iterato
             if section is None or name in section:
                 # Rounded up to a thousandth of the unit: the tried value itself, or a trifle more.
                 size = 1.0 if other is None else other.other.size
-                yield f"{where}.{name}", math.ceil(value / size * 1000.0 - 1e-6) / 1000.0
+                found[f"{where}.{name}"] = math.ceil(value / size * 1000.0 - 1e-6) / 1000.0
                 break
+    return found

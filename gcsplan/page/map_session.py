@@ -320,7 +320,7 @@ class MapSession:
             "zones": zones_geojson(document, entries, frame, self._units),
             "counts": {key: len(document.get(key) or ()) for key in ("no_fly", "keep_in")},
             "form": form_of(document, self._problems) if edits.stage == "mission" else [],
-            "problems": [{"where": p.where.rpartition(": ")[2], "message": p.message} for p in self._problems],
+            "problems": [{"where": p.key, "message": p.message} for p in self._problems],
         }  # fmt: skip
 
     def _find_tiles(self, document: EditedDocument, frame: Frame | None) -> None:

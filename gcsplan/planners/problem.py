@@ -243,9 +243,8 @@ class Solution:
 
 def gap_percent(cost: float | None, lower_bound: float | None) -> float | None:
     """How far a path may be above the best one, in percent of the lower bound; None without either."""
-    if cost is None or not lower_bound:
-        return None
-    return max(0.0, 100.0 * (cost / lower_bound - 1.0))  # below by rounding alone
+    # A path is below its bound by rounding alone.
+    return None if cost is None or not lower_bound else max(0.0, 100.0 * (cost / lower_bound - 1.0))
 
 
 PlanFunction = Callable[[Problem], Solution]

@@ -108,7 +108,7 @@ def listed_once(problems: Iterable[Mistake]) -> list[Mistake]:
     swapped = [p for p in listed if p.code == "swapped"]
     if len(swapped) < 2:
         return listed
-    others = ", ".join(p.where.rpartition(": ")[2] for p in swapped[1:MOST_SWAPPED])
+    others = ", ".join(p.key for p in swapped[1:MOST_SWAPPED])
     more = f" and {len(swapped) - MOST_SWAPPED} more" if len(swapped) > MOST_SWAPPED else ""
     first = replace(swapped[0], message=f"{swapped[0].message} (the same at {others}{more})")
     return [first if p is swapped[0] else p for p in listed if p is swapped[0] or p not in swapped]
