@@ -38,9 +38,10 @@ from gcsplan.notes.check_texts import CHECK_TEXTS
 from gcsplan.notes.input_texts import INPUT_TEXTS
 from gcsplan.notes.link_texts import LINK_TEXTS
 from gcsplan.notes.plan_texts import PLAN_TEXTS
+from gcsplan.notes.way_home_texts import WAY_HOME_TEXTS
 from gcsplan.units import Joules, Kind, Quantity, Reach, Rounding, Seconds, Symbol, Units
 
-TEXTS: Mapping[str, str] = MappingProxyType(CHECK_TEXTS | INPUT_TEXTS | LINK_TEXTS | PLAN_TEXTS)
+TEXTS: Mapping[str, str] = MappingProxyType(CHECK_TEXTS | INPUT_TEXTS | LINK_TEXTS | PLAN_TEXTS | WAY_HOME_TEXTS)
 """The catalogue: all sentences that gcsplan says of missions, by code."""
 
 Datum: TypeAlias = "float | str | bool | Note | tuple[Datum, ...] | None"

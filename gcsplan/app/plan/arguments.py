@@ -16,7 +16,7 @@ FLAGS = (
     "leave_out", "report", "way_home", "atomic", "offline", "allow_unjudged", "allow_armed", "allow_parameters",
     "ignore_position",
 )  # fmt: skip
-NUMBERS = ("wind_m_s", "gusts_m_s", "noise_m", "from_deg", "tolerance_m", "radius_km", "flat_m", "min_agl_m")
+NUMBER_ARGUMENTS = ("wind_m_s", "gusts_m_s", "noise_m", "from_deg", "tolerance_m", "radius_km", "flat_m", "min_agl_m")
 
 EXPECTED: dict[str, tuple[Any, str]] = {
     "planner": ((str, Callable), "the name of a planner (`gcsplan planners` lists them), or a function that plans"),
@@ -48,7 +48,7 @@ EXPECTED: dict[str, tuple[Any, str]] = {
     "goal": (str, "a place, such as '36.6, -84.38'"),
     "kind": (str, "'mission', 'fence' or 'rally'"),
     **dict.fromkeys(FLAGS, (bool, "True or False")),
-    **dict.fromkeys(NUMBERS, (Real, "a number")),
+    **dict.fromkeys(NUMBER_ARGUMENTS, (Real, "a number")),
 }
 """The type of each argument by its name, and what it is in words."""
 

@@ -138,8 +138,7 @@ def way_home(
         profile=_profile(trace, refinement),
         lowest=lowest_agl(trace, trace.cut(refinement.first_m), target, vehicle, level),
         not_judged=(
-            *_but_the_return(flight),
-            *_too_windy(verdict, vehicle, world, (ground, max(level, float(trace.amsl.max())))),
+            *_left_out(flight, verdict, vehicle, world, (ground, max(level, float(trace.amsl.max())))),
             *(() if route == "straight" else _landing_sequence(mission)),
         ),
         notes=tuple(notes + list(proposal.notes if proposal else ())),
@@ -190,7 +189,7 @@ def _along_mission(
     wind = None if verdict.in_wind is None else verdict.in_wind.flies_in
     joins = joins_of(stored, flight, vehicle, trace.world, wind)
     heights_m = float(trace.amsl.min()), float(trace.amsl.max())
-    known = [*_but_the_return(flight), *_too_windy(verdict, vehicle, trace.world, heights_m)]
+    known = _left_out(flight, verdict, vehicle, trace.world, heights_m)
     if joins.why_not:
         return replace(home, route="mission", starts=joins.starts, along_path=joins.path,
                        not_judged=(*joins.why_not, *known))  # fmt: skip
@@ -210,9 +209,15 @@ def _along_mission(
     )  # fmt: skip
 
 
-def _but_the_return(flight: Flight) -> list[Note]:
-    """Notes on the parts of a flight that were not judged, but for ArduPlane's own return, which is judged here."""
-    return [note for note in flight.not_judged if note.code != "returns_by_itself"]
+def _left_out(
+    flight: Flight, verdict: Verdict, vehicle: Vehicle, world: World, amsl_m: tuple[float, float]
+) -> list[Note]:
+    """Notes on what of a flight and its returns between two altitudes is not judged.
+
+    ArduPlane's own return at the flight's end is judged here.
+    """
+    unjudged = [note for note in flight.not_judged if note.code != "returns_by_itself"]
+    return [*unjudged, *_too_windy(verdict, vehicle, world, amsl_m)]
 
 
 def _too_windy(verdict: Verdict, vehicle: Vehicle, world: World, amsl_m: tuple[float, float]) -> list[Note]:
