@@ -5,45 +5,53 @@ from __future__ import annotations
 import re
 import sqlite3
 import threading
+import zlib
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from gcsplan.errors import InputError, UsageError
+from gcsplan.page.refused import not_installed
+
+try:
+    from pmtiles.reader import MmapSource, Reader
+    from pmtiles.tile import MagicNumberNotFound, SpecVersionUnsupported, TileType
+except ModuleNotFoundError as missing:
+    raise not_installed(missing.name) from None
 
 FORMATS = {"png": "image/png", "jpg": "image/jpeg", "jpeg": "image/jpeg", "webp": "image/webp"}
 """Formats of an MBTiles file that are served, by the word in its metadata."""
 
+PMTILES_FORMATS = {TileType.PNG: "image/png", TileType.JPEG: "image/jpeg", TileType.WEBP: "image/webp"}
+"""The same of a PMTiles file."""
+
 MOST_BASE_TILE_BYTES = 4 * 2**20
 
 _ADDRESS = re.compile(r"(https?://[A-Za-z0-9.-]+(?::\d+)?)/[^\s'\";,]*")
+_BROKEN_PMTILES = (
+    MagicNumberNotFound, SpecVersionUnsupported, ValueError, OSError, EOFError, IndexError, KeyError, OverflowError,
+    TypeError, zlib.error,
+)  # fmt: skip
 
 
-class BaseMap:
-    """Raster tiles of an MBTiles file, or of an address with ``{z}``, ``{x}``, ``{y}``. Raises UsageError, InputError.
+BASE_FORMS = "an .mbtiles or .pmtiles file, or an address with {z}, {x} and {y}"
 
-    ``host`` is the origin of an address, empty for a file.
-    """
 
-    def __init__(self, given: str) -> None:
-        self.host = ""
-        self._file: sqlite3.Connection | None = None
-        self._lock = threading.Lock()
-        self.media_type = ""
-        if "://" in given:
-            match = _ADDRESS.fullmatch(given)
-            if match is None or not all(part in given for part in ("{z}", "{x}", "{y}")):
-                raise UsageError(
-                    f"--base {given[:200]}: give an address with {{z}}, {{x}} and {{y}}, or an .mbtiles file"
-                )
-            self.host = match[1]
-            self._about: dict[str, Any] = {"tiles": given, "minzoom": 0, "maxzoom": 19, "attribution": ""}
-            return
-        self._about = self._opened(Path(given))
+class TileFile(Protocol):
+    """A file of raster tiles: what it holds, and one of its tiles."""
 
-    def _opened(self, file: Path) -> dict[str, Any]:
+    media_type: str
+    zooms: tuple[int, int]
+    attribution: str
+
+    def tile(self, z: int, x: int, y: int) -> bytes | None:
+        """A tile, counted from the north-west; None if there is none."""
+
+
+class MbtilesFile:
+    """An MBTiles file, which is an SQLite database. Raises InputError."""
+
+    def __init__(self, file: Path) -> None:
         try:
-            if not file.is_file():
-                raise InputError("there is no such file", where=f"--base {file}")
             self._file = sqlite3.connect(f"{file.absolute().as_uri()}?mode=ro", uri=True, check_same_thread=False)
             known = {str(k): str(v) for k, v in self._file.execute("SELECT name, value FROM metadata LIMIT 200")}
             low, high = self._file.execute("SELECT min(zoom_level), max(zoom_level) FROM tiles").fetchone()
@@ -52,8 +60,77 @@ class BaseMap:
         self.media_type = FORMATS.get(known.get("format", ""), "")
         if not self.media_type or low is None:
             raise InputError("give an MBTiles file with raster tiles (png, jpg or webp)", where=f"--base {file}")
-        attribution = re.sub(r"<[^>]*>", "", known.get("attribution", ""))[:300]
-        return {"tiles": "base/{z}/{x}/{y}", "minzoom": int(low), "maxzoom": int(high), "attribution": attribution}
+        self.zooms, self.attribution = (int(low), int(high)), known.get("attribution", "")
+
+    def tile(self, z: int, x: int, y: int) -> bytes | None:
+        """A tile, counted from the north-west; None if there is none."""
+        question = "SELECT tile_data FROM tiles WHERE zoom_level = ? AND tile_column = ? AND tile_row = ? LIMIT 1"
+        try:
+            row = self._file.execute(question, (z, x, 2**z - 1 - y)).fetchone()
+        except (sqlite3.Error, OverflowError):
+            return None
+        return row[0] if row is not None and isinstance(row[0], bytes) else None
+
+
+class PmtilesFile:
+    """A PMTiles file of version 3. Raises InputError."""
+
+    def __init__(self, file: Path) -> None:
+        try:
+            with file.open("rb") as opened:
+                self._reader = Reader(MmapSource(opened))  # its calls have no types
+            about, header = self._reader.metadata(), self._reader.header()
+        except _BROKEN_PMTILES:
+            raise InputError("this is no PMTiles file of version 3", where=f"--base {file}") from None
+        self.media_type = PMTILES_FORMATS.get(header["tile_type"], "")
+        if not self.media_type:
+            raise InputError("give a PMTiles file with raster tiles (png, jpg or webp)", where=f"--base {file}")
+        self.zooms = int(header["min_zoom"]), int(header["max_zoom"])
+        self.attribution = str(about.get("attribution", "")) if isinstance(about, dict) else ""
+
+    def tile(self, z: int, x: int, y: int) -> bytes | None:
+        """A tile, counted from the north-west; None if there is none."""
+        try:
+            found = self._reader.get(z, x, y)
+        except _BROKEN_PMTILES:
+            return None
+        return found if isinstance(found, bytes) else None
+
+
+FILES: dict[str, type[MbtilesFile | PmtilesFile]] = {".mbtiles": MbtilesFile, ".pmtiles": PmtilesFile}
+"""Files of tiles by the end of their name."""
+
+
+class BaseMap:
+    """Raster tiles of a file, or of an address with ``{z}``, ``{x}``, ``{y}``. Raises UsageError, InputError.
+
+    ``host`` is the origin of an address, empty for a file.
+    """
+
+    def __init__(self, given: str) -> None:
+        self.host = ""
+        self._file: TileFile | None = None
+        self._lock = threading.Lock()
+        self.media_type = ""
+        if "://" in given:
+            match = _ADDRESS.fullmatch(given)
+            if match is None or not all(part in given for part in ("{z}", "{x}", "{y}")):
+                raise UsageError(f"--base {given[:200]}: give {BASE_FORMS}")
+            self.host = match[1]
+            self._about: dict[str, Any] = {"tiles": given, "minzoom": 0, "maxzoom": 19, "attribution": ""}
+            return
+        file = Path(given)
+        kind = FILES.get(file.suffix.lower())
+        if kind is None:
+            raise UsageError(
+                f"--base {given[:200]}: give an .mbtiles or .pmtiles file, or an address with {{z}}, {{x}} and {{y}}"
+            )
+        if not file.is_file():
+            raise InputError("there is no such file", where=f"--base {file}")
+        self._file = kind(file)
+        self.media_type, (low, high) = self._file.media_type, self._file.zooms
+        attribution = re.sub(r"<[^>]*>", "", self._file.attribution)[:300]
+        self._about = {"tiles": "base/{z}/{x}/{y}", "minzoom": low, "maxzoom": high, "attribution": attribution}
 
     def as_dict(self) -> dict[str, Any]:
         """The protocol's ``base``."""
@@ -61,13 +138,8 @@ class BaseMap:
 
     def tile(self, z: int, x: int, y: int) -> bytes | None:
         """A tile of the file; None if it has none there."""
-        if self._file is None or not 0 <= z <= 30:
+        if self._file is None or not (0 <= z <= 30 and 0 <= x < 2**z and 0 <= y < 2**z):
             return None
-        question = "SELECT tile_data FROM tiles WHERE zoom_level = ? AND tile_column = ? AND tile_row = ? LIMIT 1"
         with self._lock:
-            try:
-                row = self._file.execute(question, (z, x, 2**z - 1 - y)).fetchone()
-            except (sqlite3.Error, OverflowError):
-                return None
-        data = row[0] if row is not None else None
-        return data if isinstance(data, bytes) and len(data) <= MOST_BASE_TILE_BYTES else None
+            data = self._file.tile(z, x, y)
+        return data if data is not None and len(data) <= MOST_BASE_TILE_BYTES else None

@@ -1,14 +1,16 @@
-"""Terrain tiles for the map: the ground that a mission is planned over, as PNG in the terrarium encoding."""
+"""Terrain tiles for the map: the ground that a mission is planned over, as PNG in the terrarium encoding; contours."""
 
 from __future__ import annotations
 
 import io
+import json
 import math
 import threading
 from collections import OrderedDict
 from pathlib import Path
 from typing import Any
 
+import contourpy
 import numpy as np
 from PIL import Image
 
@@ -18,6 +20,7 @@ from gcsplan.mission_file.scene import make_spec
 from gcsplan.mission_file.values.errors import read_section
 from gcsplan.mission_file.values.schema import TerrainKeys
 from gcsplan.mission_file.window import opened
+from gcsplan.units import METRE, Unit
 from gcsplan.world.geodesy.frame import FARTHEST_M, Frame
 from gcsplan.world.geometry.surface import Surface
 from gcsplan.world.geometry.zones import Box
@@ -35,6 +38,16 @@ BLOCK_ZOOMS = 2
 
 LEAST_ZOOM, MOST_ZOOM = 6, 15
 """Zooms of tiles; beyond, the map draws those of the last one larger."""
+
+CONTOUR_PARTS = 64
+"""Cells along a tile's edge from which its contours are drawn: some 40 m each where the map shows single posts."""
+
+CONTOURS_M = {6: 1000.0, 8: 500.0, 10: 200.0, 11: 100.0, 12: 50.0, 13: 20.0, 14: 10.0}
+CONTOURS_FT = {6: 3000.0, 8: 1500.0, 10: 500.0, 11: 250.0, 12: 100.0, 13: 50.0, 14: 25.0}
+"""Height between contours by the zoom from which it holds: lines on a slope of 1 in 4 stay some pixels apart."""
+
+MOST_CONTOURS = 200
+"""Contours of one tile: on steeper ground every second one is left out, or more."""
 
 MIDDLE_BOX_M = 1000.0
 SEA_OFFSET_M = 32768.0
@@ -91,6 +104,37 @@ class GroundTiles:
                 self._tiles.popitem(last=False)
             return made
 
+    def contours(self, z: int, x: int, y: int, unit: Unit) -> bytes | None:
+        """The contours of a tile as GeoJSON, at round numbers of ``unit``; None where there is no ground.
+
+        Each line has its ``height_m``, and ``fifth`` for every fifth one.
+        """
+        if not (LEAST_ZOOM <= z <= MOST_ZOOM and 0 <= x < 2**z and 0 <= y < 2**z):
+            return None
+        lat, lon = _lattice_deg((z, x, y))
+        with self._lock:
+            block = self._block((z, x, y))
+            if block is None:
+                return None
+            frame, surface, _ = block
+            plane = frame.to_plane(*np.broadcast_arrays(lat[:, None], lon[None, :]))
+            ground = np.ma.masked_invalid(surface.ground_at(plane[..., 0], plane[..., 1]))
+        if ground.count() == 0:
+            return None
+        made = contourpy.contour_generator(lon, lat, ground, name="serial")
+        step_m = contour_interval_m(z, unit)
+        low, high = math.ceil(float(ground.min()) / step_m), math.floor(float(ground.max()) / step_m)
+        every = max(1, math.ceil((high - low + 1) / MOST_CONTOURS))
+        lines = [
+            {
+                "type": "Feature", "properties": {"height_m": k * step_m, "fifth": k % 5 == 0},
+                "geometry": {"type": "MultiLineString", "coordinates": parts},
+            }
+            for k in range(low + -low % every, high + 1, every)
+            if (parts := [np.round(np.asarray(line), 6).tolist() for line in made.lines(k * step_m)])
+        ]  # fmt: skip
+        return json.dumps({"type": "FeatureCollection", "features": lines}, separators=(",", ":")).encode()
+
     def _made(self, tile: TileNumber) -> bytes | None:
         block = self._block(tile)
         if block is None:  # too much ground for one tile is drawn flat
@@ -141,6 +185,12 @@ class GroundTiles:
         return frame, surface, float(np.nanmin(surface.ground_m))
 
 
+def contour_interval_m(zoom: int, unit: Unit) -> float:
+    """Height between contours at a zoom, a round number of ``unit``."""
+    steps = CONTOURS_M if unit == METRE else CONTOURS_FT
+    return unit.size * steps[max(z for z in steps if z <= max(zoom, LEAST_ZOOM))]
+
+
 def _edges_deg(tile: TileNumber) -> tuple[tuple[float, float], tuple[float, float]]:
     """South and north, west and east of a tile."""
     z, x, y = tile
@@ -156,6 +206,14 @@ def _pixels_deg(tile: TileNumber) -> tuple[Floats, Floats]:
     z, x, y = tile
     part = (np.arange(TILE_PIXELS) + 0.5) / TILE_PIXELS
     lat = np.degrees(np.arctan(np.sinh(np.pi * (1.0 - 2.0 * (y + part) / 2**z))))
+    return lat, (x + part) / 2**z * 360.0 - 180.0
+
+
+def _lattice_deg(tile: TileNumber) -> tuple[Floats, Floats]:
+    """Latitudes from the north and longitudes from the west of the corners of a tile's cells, its edges among them."""
+    z, x, y = tile
+    part = np.arange(CONTOUR_PARTS + 1) / CONTOUR_PARTS
+    lat = np.array([_lat_deg(float(v), z) for v in y + part])
     return lat, (x + part) / 2**z * 360.0 - 180.0
 
 

@@ -25,7 +25,7 @@ from gcsplan.mission_file.request import Content
 from gcsplan.page import answers
 from gcsplan.page.edits import Edits, terrain_choices
 from gcsplan.page.form import form_of
-from gcsplan.page.ground_tiles import LEAST_ZOOM, MOST_ZOOM, GroundTiles
+from gcsplan.page.ground_tiles import LEAST_ZOOM, MOST_ZOOM, GroundTiles, contour_interval_m
 from gcsplan.page.history import EditedDocument
 from gcsplan.page.places import read_text, vehicles_of
 from gcsplan.page.refused import PageError
@@ -105,6 +105,11 @@ class MapSession:
         """A terrain tile; None if there is none, or another terrain by now."""
         tiles = self._tiles
         return None if tiles is None or revision != self._revision else tiles.png(z, x, y)
+
+    def contours(self, revision: int, z: int, x: int, y: int) -> bytes | None:
+        """The contours of a terrain tile as GeoJSON, in the page's units; None as for `tile`."""
+        tiles = self._tiles
+        return None if tiles is None or revision != self._revision else tiles.contours(z, x, y, self._units.height)
 
     def close(self) -> Path | None:
         """End the session; the file in which unsaved edits are kept, None if all are saved. Raises InputError."""
@@ -343,6 +348,8 @@ class MapSession:
         return {
             "tiles": f"terrain/{self._revision}/{{z}}/{{x}}/{{y}}.png", "bounds": tiles.bounds, "minzoom": LEAST_ZOOM,
             "maxzoom": MOST_ZOOM, "flat": tiles.flat,
+            "contours": f"contours/{self._revision}/{self._units.name}/{{z}}/{{x}}/{{y}}.json",
+            "contours_m": [contour_interval_m(zoom, self._units.height) for zoom in range(MOST_ZOOM + 1)],
         }  # fmt: skip
 
 

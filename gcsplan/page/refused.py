@@ -1,4 +1,4 @@
-"""`PageError`: why the server does not do what a message of the page requests."""
+"""`PageError`: why the server does not do what a message of the page requests; and why there is no server."""
 
 from __future__ import annotations
 
@@ -17,3 +17,10 @@ class PageError(InputError):
     def __init__(self, message: str, *, code: PageCode, where: str = "") -> None:
         super().__init__(message, where=where)
         self.code = code
+
+
+def not_installed(package: str | None) -> InputError:
+    """The error of a package of the extra `map` that is absent, with its cure."""
+    return InputError(
+        f"the map needs {package}, which is not installed: pip install 'gcsplan[map]'", where="gcsplan map"
+    )

@@ -19,7 +19,7 @@ from gcsplan.errors import InputError, UsageError
 from gcsplan.page.base_map import BaseMap
 from gcsplan.page.guard import AsgiApp, Guard, Rate
 from gcsplan.page.map_session import MapSession, PageMessage
-from gcsplan.page.refused import PageError
+from gcsplan.page.refused import PageError, not_installed
 
 try:
     import uvicorn
@@ -29,9 +29,7 @@ try:
     from starlette.routing import Route, WebSocketRoute
     from starlette.websockets import WebSocket, WebSocketDisconnect
 except ModuleNotFoundError as missing:
-    raise InputError(
-        f"the map needs {missing.name}, which is not installed: pip install 'gcsplan[map]'", where="gcsplan map"
-    ) from None
+    raise not_installed(missing.name) from None
 
 HOST = "127.0.0.1"
 STATIC = Path(__file__).parent / "static"
@@ -129,6 +127,7 @@ class MapServer:
             routes=[
                 Route("/", self._file),
                 Route("/terrain/{revision:int}/{z:int}/{x:int}/{y:int}.png", self._terrain),
+                Route("/contours/{revision:int}/{units}/{z:int}/{x:int}/{y:int}.json", self._contours),
                 Route("/base/{z:int}/{x:int}/{y:int}", self._base_tile),
                 WebSocketRoute("/socket", self._talk),
                 Route("/{path:path}", self._file),
@@ -145,6 +144,11 @@ class MapServer:
     async def _terrain(self, request: Request) -> Response:
         place = (int(request.path_params[key]) for key in ("revision", "z", "x", "y"))
         return _tile(await asyncio.to_thread(self._session.tile, *place), "image/png")
+
+    async def _contours(self, request: Request) -> Response:
+        # The units stand in the address for the browser's cache alone: a page has those of its session.
+        place = (int(request.path_params[key]) for key in ("revision", "z", "x", "y"))
+        return _tile(await asyncio.to_thread(self._session.contours, *place), "application/geo+json")
 
     async def _base_tile(self, request: Request) -> Response:
         place = (int(request.path_params[key]) for key in ("z", "x", "y"))
@@ -251,9 +255,7 @@ def files_served() -> dict[str, Path]:
     """
     found = find_spec("maplibre")  # looked up, not imported: the package imports much that is not needed
     if found is None or not found.submodule_search_locations:
-        raise InputError(
-            "the map needs maplibre, which is not installed: pip install 'gcsplan[map]'", where="gcsplan map"
-        )
+        raise not_installed("maplibre")
     library = Path(next(iter(found.submodule_search_locations))) / "srcjs"
     files = {f"static/{file.name}": file for file in STATIC.iterdir() if file.suffix in MEDIA_TYPES}
     files |= {f"lib/{name}": library / name for name in MAP_FILES}

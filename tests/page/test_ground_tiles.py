@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import math
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from gcsplan.bench.sample import SAMPLE_MIDDLE_DEG, SAMPLE_TERRAIN
 from gcsplan.errors import InputError
 from gcsplan.mission_file import load_mission
 from gcsplan.page.ground_tiles import GroundTiles
+from gcsplan.units import FOOT, METRE, Unit
 from gcsplan.world.geodesy.frame import Frame
 
 
@@ -92,3 +94,31 @@ def test_a_tile_at_a_slanted_edge_is_there_because_the_page_requests_it() -> Non
 
 def test_ground_that_is_too_much_for_one_tile_is_flat_there() -> None:
     assert (heights(GroundTiles(SAMPLE_TERRAIN, Path(), None).png(6, 17, 24)) == 0.0).all()
+
+
+@pytest.mark.parametrize(("unit", "step_m"), [(METRE, 20.0), (FOOT, 50 * 0.3048)])
+def test_contours_lie_on_the_ground_of_their_height(unit: Unit, step_m: float) -> None:
+    tiles = GroundTiles(SAMPLE_TERRAIN, Path(), None)
+    lat, lon = SAMPLE_MIDDLE_DEG
+    zoom, x, y, _, _ = tile_at(lat, lon, 13)
+    drawn = json.loads(tiles.contours(zoom, x, y, unit) or b"")
+    rise = sorted({line["properties"]["height_m"] for line in drawn["features"]})
+    assert np.diff(rise) == pytest.approx(step_m)
+    assert {round(h / step_m) % 5 == 0 for h in rise} == {True, False}
+    ground = heights(tiles.png(zoom, x, y))
+    assert rise[0] - step_m < ground.min() <= rise[0] + 1.0  # a pixel's height is read at its middle
+    assert rise[-1] - 1.0 <= ground.max() < rise[-1] + step_m
+    for line in drawn["features"]:
+        for part in line["geometry"]["coordinates"]:
+            for lon_deg, lat_deg in part:
+                _, i, j, row, col = tile_at(lat_deg, lon_deg, zoom)
+                if (i, j) == (x, y) and 4 <= min(row, col) <= max(row, col) < 252:
+                    near = ground[row - 4 : row + 5, col - 4 : col + 5]
+                    assert near.min() - 1.0 <= line["properties"]["height_m"] <= near.max() + 1.0
+
+
+def test_no_contours_where_there_is_no_ground() -> None:
+    tiles = GroundTiles(SAMPLE_TERRAIN, Path(), None)
+    assert (
+        tiles.contours(13, 0, 0, METRE) is tiles.contours(13, -1, 0, METRE) is tiles.contours(40, 0, 0, METRE) is None
+    )

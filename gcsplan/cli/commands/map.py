@@ -25,7 +25,9 @@ def map_(
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")] = True,
     base: Annotated[
         str | None,
-        typer.Option(metavar="MAP", help="Map below it all: an .mbtiles file, or an address with {z}, {x} and {y}."),
+        typer.Option(
+            metavar="MAP", help="Map below it all: an .mbtiles or .pmtiles file, or an address with {z}, {x} and {y}."
+        ),
     ] = None,
     units: UnitsOption = UnitsChoice.METRIC,
 ) -> None:

@@ -3,6 +3,7 @@ import { byId } from './dom.js';
 import { on } from './hub.js';
 import { connect } from './link.js';
 import { banner, startBar } from './bar.js';
+import { startContours } from './contours.js';
 import { startFromNothing } from './start.js';
 import { startGrips } from './grips.js';
 import { startLimits } from './limits.js';
@@ -24,6 +25,7 @@ function start() {
     banner('map', `The map needs WebGL, which this browser does not offer: ${error.message}`, [], 'bad');
     return;
   }
+  startContours();
   startShapes();
   startGrips();
   startModes();

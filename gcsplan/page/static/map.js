@@ -117,6 +117,10 @@ function coloured(layer) {
     'hillshade-shadow-color': dark ? '#05070a' : '#4a3a28', 'hillshade-accent-color': dark ? '#0c1116' : '#7a6a55',
     'hillshade-highlight-color': dark ? '#8d9aa8' : '#ffffff',
   };
+  if (layer.id === 'contours') layer.paint = {
+    'line-color': dark ? '#c9b79a' : '#6b4a1f', 'line-opacity': dark ? 0.45 : 0.5,
+    'line-width': ['case', ['get', 'fifth'], 1.2, 0.5],
+  };
   if (layer.id === 'base') layer.paint = { 'raster-opacity': dark ? 0.55 : 0.85, 'raster-fade-duration': 0 };
   return layer;
 }
@@ -137,7 +141,20 @@ function dress(state) {
       minzoom: terrain.minzoom, maxzoom: terrain.maxzoom, bounds: terrain.bounds,
     };
     layers.push(coloured({ id: 'shade', type: 'hillshade', source: 'ground' }));
+    sources.contours = { type: 'geojson', data: { type: 'FeatureCollection', features: [] }, tolerance: 0 };
+    layers.push(coloured({ id: 'contours', type: 'line', source: 'contours' }));
   }
   map.setStyle({ version: 8, sources, layers }, { diff: false });
-  byId('attribution').textContent = base ? base.attribution : '';
+  tell('dressed');
+}
+
+export const source = (id) => map.getSource(id);
+
+// The tiles that are in the picture, as [z, x, y] of a zoom that is a whole number from `least` to `most`.
+export function tilesShown(least, most) {
+  const z = Math.max(least, Math.min(most, Math.floor(map.getZoom() + 0.5))), box = map.getBounds(), count = 2 ** z;
+  const at = (lat, lon) => world([lat, lon]).map((v) => Math.max(0, Math.min(count - 1, Math.floor((v / (512 * 2 ** DETAIL)) * count))));
+  const [west, north] = at(box.getNorth(), box.getWest()), [east, south] = at(box.getSouth(), box.getEast()), tiles = [];
+  for (let y = north; y <= south; y++) for (let x = west; x <= east; x++) tiles.push([z, x, y]);
+  return tiles;
 }

@@ -42,10 +42,11 @@ def test_ctrl_c_ends_the_server_and_keeps_the_edits(tmp_path: Path) -> None:
     assert kept["mission"]["vehicles"][0]["goal"] == [46.52, 8.5]
 
 
-def test_a_missing_package_is_one_line_with_its_cure(run: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("package", ["starlette.applications", "pmtiles.reader"])
+def test_a_missing_package_is_one_line_with_its_cure(run: Any, monkeypatch: pytest.MonkeyPatch, package: str) -> None:
     for name in [name for name in sys.modules if name.startswith("gcsplan.page")]:
         monkeypatch.delitem(sys.modules, name)
-    monkeypatch.setitem(sys.modules, "starlette.applications", None)
+    monkeypatch.setitem(sys.modules, package, None)
     code, out, err = run("map", "--no-browser")
     assert (code, out) == (2, "")
     assert "pip install 'gcsplan[map]'" in err
@@ -54,7 +55,12 @@ def test_a_missing_package_is_one_line_with_its_cure(run: Any, monkeypatch: pyte
 
 @pytest.mark.parametrize(
     ("arguments", "words"),
-    [(("nowhere.yaml",), "no such file"), (("--port", "99999"), "--port 99999"), (("--base", "x.mb"), "no such file")],
+    [
+        (("nowhere.yaml",), "no such file"),
+        (("--port", "99999"), "--port 99999"),
+        (("--base", "x.pmtiles"), "no such file"),
+        (("--base", "x.mb"), "an .mbtiles or .pmtiles file"),
+    ],
 )
 def test_bad_input_ends_with_two_before_anything_is_served(
     run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: tuple[str, ...], words: str
