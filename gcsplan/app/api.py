@@ -22,7 +22,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, overload
 
-from gcsplan.app.check.files import check_files, check_mission
+from gcsplan.app.check.files import check_files, check_mission, in_other_winds
 from gcsplan.app.fleet.may_fly import flyable, require_passing
 from gcsplan.app.output import files as outputs
 from gcsplan.app.plan import way_home as returns
@@ -52,14 +52,21 @@ Source = MissionFile | str | os.PathLike[str] | Mapping[str, Any]
 
 
 @overload
-def check(what: Plan) -> dict[str, Verdict]: ...
+def check(what: Plan, *, wind: Mapping[str, Any] | None = None) -> dict[str, Verdict]: ...
 @overload
-def check(what: Mission | str | os.PathLike[str], within: Plan | Source, *, vehicle: str | None = None) -> Verdict: ...
+def check(
+    what: Mission | str | os.PathLike[str],
+    within: Plan | Source,
+    *,
+    vehicle: str | None = None,
+    wind: Mapping[str, Any] | None = None,
+) -> Verdict: ...
 def check(
     what: Plan | Mission | str | os.PathLike[str],
     within: Plan | Source | None = None,
     *,
     vehicle: str | None = None,
+    wind: Mapping[str, Any] | None = None,
 ) -> Verdict | dict[str, Verdict]:
     """Judge mission items along every leg as the autopilot flies them; nothing is planned, written or sent.
 
@@ -67,7 +74,8 @@ def check(
     name. A `Mission` (such as ``planned.vehicles[0].mission`` or a downloaded one), or the path of any `.waypoints` or
     `.plan` file: the result is one verdict. The last two need ``within``: a plan or a mission (or anything that
     `load_mission` accepts) with the terrain, zones and limits. ``vehicle`` names the vehicle of ``within`` that flies,
-    if neither the file's stem nor the mission's name does.
+    if neither the file's stem nor the mission's name does. ``wind`` has the keys of a mission's `wind` (such as
+    ``{"up_to_m_s": 8}``), which count in place of the world's own.
 
     In a `Verdict`, ``safe`` is True, False or None (something could not be judged: ``not_judged``). ``findings`` state
     which limit is broken on which item. ``legs`` hold heights in m, angles in degrees, times in s and energies in J.
@@ -90,14 +98,15 @@ def check(
         >>> check(planned.vehicles[0].mission, mission).safe
         True
     """
-    require("check", vehicle=vehicle, **({} if isinstance(what, Plan | Mission) else {"what": what}))
+    require("check", vehicle=vehicle, wind=wind, **({} if isinstance(what, Plan | Mission) else {"what": what}))
     if isinstance(what, Plan):
         if within is not None or vehicle is not None:
             raise UsageError("a plan is judged whole, in its own world: give nothing else to check")
-        source, flown = what.source, []
+        source, flown = what.source if wind is None else in_other_winds(what.source, wind), []
+        flies = {r.vehicle.name: r.vehicle for r in source.vehicles} if wind is not None else {}
         for v in what.vehicles:
             again = judge(
-                v.mission, v.request.vehicle, what.world, rtl_rel_home_m=v.request.rtl_rel_home_m,
+                v.mission, flies.get(v.name, v.request.vehicle), what.world, rtl_rel_home_m=v.request.rtl_rel_home_m,
                 terrain_error_m=source.terrain_error_m, wind=source.flight_wind,
             )  # fmt: skip
             flown.append(replace(v, verdict=again))
@@ -108,6 +117,8 @@ def check(
         source = within.source
     else:
         source = within if isinstance(within, MissionFile) else load_mission(within)
+    if wind is not None:
+        source = in_other_winds(source, wind)
     if isinstance(what, Mission):
         return check_mission(source, what, vehicle).verdict
     file = os.fspath(what)

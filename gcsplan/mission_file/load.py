@@ -277,7 +277,7 @@ class _MissionReading:
         departure = self.content.departure or (None if hours is None else hours.start)
         wind = self._wind(hours, frame, places)
         if wind is not None:
-            terminals = [replace(t, vehicle=in_wind(t.vehicle, wind)) for t in terminals]
+            terminals = [replace(t, vehicle=t.vehicle and in_wind(t.vehicle, wind)) for t in terminals]
             self.notes += [slopes_in_wind(t.vehicle) for t in terminals if t.vehicle and t.vehicle.blows_m_s]
         site: MissionPlane | None = None
         ground: GroundWindow | None = None

@@ -6,7 +6,7 @@ Everything is judged by the same rules as in a mission file; a mistake is report
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -19,7 +19,7 @@ from gcsplan.errors import InputError, Mistake
 from gcsplan.mavlink.mission.return_parameters import ReturnRoute
 from gcsplan.mission_file.load import TERRAIN_ERROR_M
 from gcsplan.mission_file.published.policy import Policy
-from gcsplan.mission_file.published.times import hours_of
+from gcsplan.mission_file.published.times import begins_with_day, hours_of
 from gcsplan.mission_file.published.unused import (
     faults_near,
     left_out_by_hours,
@@ -29,8 +29,9 @@ from gcsplan.mission_file.published.unused import (
 )
 from gcsplan.mission_file.scene import make_spec, settle_areas, settle_zones
 from gcsplan.mission_file.values.errors import read_section
-from gcsplan.mission_file.values.schema import LimitKeys, TerrainKeys, VehicleKeys
+from gcsplan.mission_file.values.schema import LimitKeys, TerrainKeys, VehicleKeys, WindKeys
 from gcsplan.mission_file.vehicles import make_vehicle
+from gcsplan.mission_file.winds.declaration import NEEDS_DEPARTURE, go_together, winds_of, winds_of_forecast
 from gcsplan.mission_file.zone_reader import read_zones
 from gcsplan.mission_file.zones.draft import (
     ZoneDraft,
@@ -44,6 +45,8 @@ from gcsplan.mission_file.zones.file import Ignorable, OnBad
 from gcsplan.mission_file.zones.keep_in import apart, as_keep_in, outside_zones, place_keep_in
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Vehicle
+from gcsplan.wind.declared import STILL_AIR, DeclaredWind
+from gcsplan.wind.wording import wind_note
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.geodesy.frame import FARTHEST_M, Frame, centre_of
 from gcsplan.world.geometry.zones import Box, Zone
@@ -72,7 +75,7 @@ class WorldOptions:
     """The values of the options, by the mission file's names. Paths are as written; None means not given.
 
     ``home`` (latitude, longitude) is the home of every file, ``at`` says when they fly, and ``notes`` say how options
-    were read. ``on_bad`` and ``ignore`` are the rules for all files of zones.
+    were read. ``on_bad`` and ``ignore`` are the rules for all files of zones. ``wind``: keys of `wind`.
     """
 
     terrain: Mapping[str, object] = field(default_factory=dict)
@@ -88,6 +91,7 @@ class WorldOptions:
     on_bad: OnBad | None = None
     ignore: tuple[Ignorable, ...] = ()
     keep_in: tuple[str, ...] = ()
+    wind: Mapping[str, object] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,6 +100,9 @@ class WorldExtent:
 
     centre_deg: tuple[float, float]
     box: Box
+
+
+_WindOver = Callable[[WorldExtent, list[Mistake]], tuple[DeclaredWind, tuple[Note, ...]] | None]
 
 
 class OpenWorld:
@@ -108,7 +115,7 @@ class OpenWorld:
         hours = hours_of(None, None, "--at", problems, instead=options.at)
         policy = Policy(hours=hours, where="--zones", on_bad=options.on_bad, ignore=options.ignore)
         self._drafts, self._inside = apart(_drafts(options, problems, self.notes, policy), problems)
-        self.hours = hours if left_out_by_hours(self._drafts) else None
+        self.hours, self._flown = hours if left_out_by_hours(self._drafts) else None, hours
         self._terrain: OpenTerrain | None = None
         self._made: dict[str, Vehicle] = {}
         keys = read_section(TerrainKeys, dict(options.terrain), "", problems)
@@ -121,8 +128,60 @@ class OpenWorld:
         self._limits = read_section(LimitKeys, dict(options.limits), "", problems) or LimitKeys()
         if not problems:
             self.vehicle("file", "arducopter")  # finds contradictions in the limits before any file is opened
-        if problems:
-            raise InputError.of([_renamed(p) for p in problems])
+        windy: list[Mistake] = []
+        self._wind = self._read_wind(windy)
+        if problems or windy:
+            raise InputError.of([*(_renamed(p) for p in problems), *windy])
+
+    @property
+    def departs_s(self) -> float:
+        """When each file's flight begins, seconds UTC since 1970; 0 if the options do not say."""
+        return 0.0 if self._flown is None else self._flown.start.timestamp()
+
+    def wind(self, extent: WorldExtent) -> tuple[DeclaredWind, tuple[Note, ...]]:
+        """The declared winds in a part of the world, still air if there are none, and notes on them. Raises InputError
+        where it is too far from the place of a forecast."""
+        if self._wind is None:
+            return STILL_AIR, ()
+        problems: list[Mistake] = []
+        made = self._wind(extent, problems)
+        if made is None:
+            raise InputError.of(problems)
+        return made
+
+    def _read_wind(self, problems: list[Mistake]) -> _WindOver | None:
+        """What makes the winds of a part of the world from ``--wind``; None without it, or if it has mistakes."""
+        if self.options.wind is None:
+            return None
+        where = "--wind: wind"
+        keys = read_section(WindKeys, dict(self.options.wind), where, problems)
+        if keys is None or problems or not go_together(keys, where, problems):
+            return None
+        if keys.forecast is None:
+            winds = winds_of(keys, where, problems)
+            return None if winds is None else lambda *_: (winds, () if winds.still else (wind_note(winds),))
+        hours = self._flown
+        if hours is None and self.options.at is not None:
+            return None
+        if hours is None or begins_with_day(self.options.at):
+            problems.append(Mistake("--wind", NEEDS_DEPARTURE))
+            return None
+        from gcsplan.mission_file.winds.forecast import read_forecast  # imported here: most checks name no forecast
+
+        try:
+            forecast = read_forecast(Path(keys.forecast), where)
+            forecast.within(hours)
+        except InputError as why:
+            problems += why.problems
+            return None
+
+        def over(extent: WorldExtent, faults: list[Mistake]) -> tuple[DeclaredWind, tuple[Note, ...]] | None:
+            west, south, east, north = extent.box
+            corners, frame = [(e, n) for e in (west, east) for n in (south, north)], Frame(*extent.centre_deg)
+            made = winds_of_forecast(keys, lambda: forecast, hours, frame, corners, where, faults)
+            return None if made is None else (made[0], (wind_note(made[0]), made[1]))
+
+        return over
 
     def vehicle(self, name: str, autopilot: str) -> Vehicle:
         """The vehicle that the options describe, for a file of that autopilot. Raises InputError."""
@@ -202,7 +261,7 @@ class OpenWorld:
             raise InputError.of([_renamed(p) for p in problems])
         zones += outside_zones(settle_areas(place_keep_in(self._inside, frame), surface), local=False)
         notes = [*self.notes, *notes_on(surface.info), *zone_notes(placed), *not_understood_far(placed, far, box)]
-        notes += unused_notes(self._drafts, frame, box)
+        notes += [*unused_notes(self._drafts, frame, box), *self.wind(extent)[1]]
         if far:
             notes.append(Note("zones_left_out", count=len(far)))
         inputs = {k: v for k, v in surface.info.items() if k not in ("notes", "source")}

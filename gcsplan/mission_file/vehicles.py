@@ -135,12 +135,12 @@ WIND_COURSES = 72
 """Courses, evenly all around, for which a fixed wing knows the strongest wind along them."""
 
 
-def in_wind(vehicle: Vehicle | None, wind: DeclaredWind) -> Vehicle | None:
+def in_wind(vehicle: Vehicle, wind: DeclaredWind) -> Vehicle:
     """A fixed wing in the winds that its mission declares, with limits that hold over ground in each; others as given.
 
     A wind adds to the speed over ground and not to the climb: slopes are less steep with the strongest wind behind.
     """
-    if vehicle is None or wind.still or not vehicle.keeps_airspeed:
+    if wind.still or not vehicle.keeps_airspeed:
         return vehicle
     courses_rad = 2.0 * np.pi * np.arange(WIND_COURSES) / WIND_COURSES
     limits, blows_m_s = vehicle.limits, tuple(wind.along_m_s(courses_rad).tolist())

@@ -199,6 +199,23 @@ def test_a_plan_a_mission_and_a_file_are_judged_alike(cross: Plan, tmp_path: Pat
         gcsplan.check(tmp_path / "none.plan", cross, vehicle="west")
 
 
+def test_another_wind_counts_for_a_plan_a_mission_and_a_file(cross: Plan, tmp_path: Path) -> None:
+    write(cross, tmp_path)
+    wind = {"speed_m_s": 8, "from_deg": 30}
+    assert all(v.verdict.arrive_window_s() is None for v in cross.vehicles)
+    for name, verdict in gcsplan.check(cross, wind=wind).items():
+        mission = next(v.mission for v in cross.vehicles if v.name == name)
+        file = gcsplan.check(tmp_path / f"{name}.plan", TEXT, wind=wind)
+        for other in (gcsplan.check(mission, cross, wind=wind), file):
+            assert other.arrive_window_s() == pytest.approx(verdict.arrive_window_s(), abs=0.01)
+            assert other.energy_j == pytest.approx(verdict.energy_j, rel=1e-4)
+    assert gcsplan.check(mission, cross, wind={"up_to_m_s": 0}).legs == gcsplan.check(mission, cross).legs
+    with pytest.raises(InputError, match="given speed_m_s and up_to_m_s"):
+        gcsplan.check(cross, wind=wind | {"up_to_m_s": 3})
+    with pytest.raises(UsageError, match=r"wind.*a mapping of the keys of a mission's `wind`"):
+        gcsplan.check(cross, wind="5,270")  # type: ignore[call-overload]
+
+
 def lowered(items: tuple[MissionItem, ...]) -> tuple[MissionItem, ...]:
     return tuple(dataclasses.replace(item, z=min(item.z, 5.0)) for item in items)
 

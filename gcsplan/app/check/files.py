@@ -23,11 +23,13 @@ from gcsplan.app.check.worlds import (
     places_of,
 )
 from gcsplan.app.plan.way_home import is_required, lets_fly
-from gcsplan.errors import CheckFailed, GcsplanError, InputError, Mistake, worst_of
+from gcsplan.errors import CheckFailed, GcsplanError, InputError, Mistake, UsageError, worst_of
 from gcsplan.figures import counted
 from gcsplan.mavlink.files.file_items import MissionFileRead
 from gcsplan.mavlink.mission.mission import Home, Mission
 from gcsplan.mission_file import MissionFile
+from gcsplan.mission_file.changes import MissionChange, changed
+from gcsplan.mission_file.load import load_content
 from gcsplan.mission_file.options_world import WorldOptions
 from gcsplan.notes.note import IN_FILES, Note, Wording
 from gcsplan.vehicle import Autopilot
@@ -69,6 +71,19 @@ def check_batch(source: MissionFile, arguments: Sequence[str], *, returns: Retur
         match(source, argument)
     both = replace(returns, required=is_required(source, returns.required))
     return check_at(MissionSite(source), source.name, arguments, VerdictParts(both))
+
+
+def in_other_winds(source: MissionFile, wind: Mapping[str, object]) -> MissionFile:
+    """``source`` with other winds, by the keys of a mission's `wind`.
+
+    Raises InputError, and UsageError for a mission that `load_mission` did not make.
+    """
+    content = source.content
+    if content is None:
+        raise UsageError("the mission was not made by load_mission: give its file, text or mapping", where="check()")
+    made = changed(content.given, [MissionChange("", "wind", "wind", dict(wind))], content.file.parent)
+    again = load_content(replace(content, given=made.raw, text=None))  # lines of the text are those before
+    return (again.at_level(source.level) if again.at_level is not None else None) or again
 
 
 def check_mission(source: MissionFile, mission: Mission, vehicle: str | None = None) -> Checked:

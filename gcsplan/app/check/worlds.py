@@ -35,10 +35,11 @@ from gcsplan.mavlink.mission.mission import NO_POSITION, Home, Mission, MissionI
 from gcsplan.mission_file import MissionFile, VehicleRequest
 from gcsplan.mission_file.options_world import KEY_OPTIONS, OpenWorld, WorldExtent, WorldOptions
 from gcsplan.mission_file.published.times import Hours
+from gcsplan.mission_file.vehicles import in_wind, slopes_in_wind
 from gcsplan.notes.note import Note, Wording
 from gcsplan.units import Units
-from gcsplan.vehicle import Autopilot, Vehicle
-from gcsplan.wind.declared import FlightWind
+from gcsplan.vehicle import DEFAULT_LEAN_DEG, Autopilot, Vehicle
+from gcsplan.wind.declared import DeclaredWind, FlightWind
 from gcsplan.world.geodesy.frame import FARTHEST_M
 from gcsplan.world.world import World
 
@@ -160,7 +161,7 @@ class MissionSite:
     @property
     def sources(self) -> tuple[Mapping[str, object], tuple[Note, ...]]:
         """See `CheckSite.sources`."""
-        return self.source.inputs, self.source.notes
+        return self.source.inputs, (*self.source.changes, *self.source.notes)
 
 
 class OptionsSite:
@@ -175,7 +176,7 @@ class OptionsSite:
         self.opened = OpenWorld(options)
         self._hint = None if options.home is None else Home.at(*options.home, 0.0)
         self.extent: WorldExtent | None = None
-        self._world: World | None = None
+        self._made: tuple[World, DeclaredWind] | None = None
         self._sources: tuple[Mapping[str, object], tuple[Note, ...]] = {}, ()
 
     def read(self, argument: str) -> MissionFileRead:
@@ -196,25 +197,28 @@ class OptionsSite:
 
     def settle_in(self, extent: WorldExtent) -> None:
         """Load the world of an extent that another process found. Raises InputError."""
-        self._world = self._tell(*self.opened.over(extent))
+        self._made = self._over(extent)
         self.extent = extent
 
     def judged(self, argument: str, read: MissionFileRead, parts: VerdictParts) -> Checked:
         """See `CheckSite.judged`."""
-        world = self._world
-        if world is None:
-            world = self._tell(*self.opened.around(places_of(read.mission), beyond_m(read.mission)))
+        opened = self.opened
+        made = self._made or self._over(opened.extent(places_of(read.mission), beyond_m(read.mission)))
+        world, wind = made
         file = Path(argument)
-        request = _request(self.opened, read.mission, file.stem, world)
-        done = judged(request, file, read, world, self.options.terrain_error_m, parts, self.opened.hours)
-        return replace(done, typed=self.typed)
+        request = _request(opened, read.mission, file.stem, world, wind)
+        flown = None if wind.still else FlightWind(wind, (opened.departs_s, opened.departs_s))
+        done = judged(request, file, read, world, self.options.terrain_error_m, parts, opened.hours, flown)
+        slopes = (slopes_in_wind(request.vehicle),) if request.vehicle.blows_m_s else ()
+        return replace(done, typed=self.typed, notes=(*done.notes, *slopes))
 
-    def _tell(self, world: World, inputs: Mapping[str, object]) -> World:
-        """``world``; the sources of the first world stand for all of them."""
+    def _over(self, extent: WorldExtent) -> tuple[World, DeclaredWind]:
+        """The world of an extent, and its winds; the sources of the first world stand for all of them."""
+        world, inputs = self.opened.over(extent)
         if not self._sources[0]:
             notes = inputs.get("notes", ())
             self._sources = {k: v for k, v in inputs.items() if k != "notes"}, notes if isinstance(notes, tuple) else ()
-        return world
+        return world, self.opened.wind(extent)[0]
 
     @property
     def sources(self) -> tuple[Mapping[str, object], tuple[Note, ...]]:
@@ -314,12 +318,16 @@ def _with_home(read: MissionFileRead, given: Home | None, argument: str) -> Miss
     return read
 
 
-def _request(opened: OpenWorld, mission: Mission, name: str, world: World) -> VehicleRequest:
+def _request(
+    opened: OpenWorld, mission: Mission, name: str, world: World, wind: DeclaredWind
+) -> VehicleRequest:  # fmt: skip
     at = mission.home.lat_e7 / 1e7, mission.home.lon_e7 / 1e7
     east, north = (float(x) for x in world.frame.to_plane(*at))
     place = (east, north, world.ground_amsl(*at))
     vehicle = opened.vehicle(re.sub(r"[^A-Za-z0-9_-]", "_", name) or "file", mission.autopilot.value)
-    o = opened.options
+    vehicle, o = in_wind(vehicle, wind), opened.options
+    if not wind.still and vehicle.autopilot is Autopilot.ARDUCOPTER:  # a mission file would say it, or mean the default
+        vehicle = replace(vehicle, lean_angle_deg=DEFAULT_LEAN_DEG)
     return VehicleRequest(vehicle, place, place, at, at, rtl_rel_home_m=o.rtl_rel_home_m, return_route=o.return_route)
 
 

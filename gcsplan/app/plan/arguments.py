@@ -33,6 +33,7 @@ EXPECTED: dict[str, tuple[Any, str]] = {
     "file": (PATH_KINDS, "the path of a file"),
     "what": (PATH_KINDS, "a plan, a mission, or the path of a .waypoints or .plan file"),
     "vehicle": (str, "the name of a vehicle"),
+    "wind": (Mapping, "a mapping of the keys of a mission's `wind`, such as {'up_to_m_s': 8}"),
     "mirror": (str, "the URL of a mirror"),
     "vertical_datum": (str, "the name of a vertical datum, such as 'EGM96'"),
     "autopilot": (str, "the name of an autopilot, such as 'arducopter'"),

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from gcsplan.cli.arguments import completion
+from gcsplan.cli.arguments.changes import WindOption, wind_changes
 from gcsplan.cli.arguments.options import (
     AtOption,
     ClusterOption,
@@ -121,6 +123,7 @@ def check(
         typer.Option(metavar="ROUTE", help="straight home, or by the mission's return path or landing: mission."),
     ] = None,
     at: AtOption = None,
+    wind: WindOption = None,
     way_home: WayHomeOption = False,
     require_way_home: RequireWayHomeOption = False,
     units: UnitsOption = UnitsChoice.METRIC,
@@ -189,7 +192,7 @@ def check(
     arguments = [file for argument in arguments for file in _named(argument)]
     form: Form = "whole" if as_json else "row" if json_lines else "lines"
     shown = Shown(form, allow_unjudged, units_of(units), len(arguments) > 1)
-    archive = _archive(mission, arguments, given, returns, shown, at)
+    archive = _archive(mission, arguments, given, returns, shown, (at, wind))
     printer = Document() if as_json else Rows() if json_lines else Lines(shown.units, summed=not quiet)
     reading = steady(check_sites.split_name(file)[1] for file in arguments)
     if report is None and (rows or quiet or len(arguments) > MOST_TABLES):
@@ -250,20 +253,23 @@ def _is_mission(argument: str) -> bool:
 
 
 def _archive(
-    mission: str | None, files: list[str], given: dict[str, object], returns: Returns, shown: Shown, at: str | None
-) -> Archive:
-    """The files in the world of a mission file, or in the world of the options."""
+    mission: str | None, files: list[str], given: dict[str, object], returns: Returns, shown: Shown,
+    when: tuple[str | None, str | None],
+) -> Archive:  # fmt: skip
+    """The files in the world of a mission file, or in the world of the options; ``when``: ``--at`` and ``--wind``."""
     from gcsplan.app.check.many import Archive
     from gcsplan.app.fleet import pipeline
     from gcsplan.vehicle import Autopilot
 
+    at, winds = when[0], wind_changes(when[1])
     if mission is not None:
         terrain = {key: given.pop(option) for key, option in READ_BY.items() if option in given}
         if given:
             raise UsageError(f"{', '.join(given)}: the mission file says that; leave it out, or give no mission file")
         if not files:
             raise UsageError(f"which files are to be checked in the world of {mission}? Give .waypoints or .plan files")
-        return Archive.in_mission(pipeline.load_mission(Path(mission), at=at, terrain=terrain), files, returns, shown)
+        source = pipeline.load_mission(Path(mission), at=at, terrain=terrain, changes=winds)
+        return Archive.in_mission(source, files, returns, shown)
     missing = [name for name in ("--dem", "--min-agl") if name not in given]
     if missing:
         raise UsageError(
@@ -273,7 +279,8 @@ def _archive(
     if name is not None and name not in tuple(Autopilot):
         raise UsageError(f"--autopilot {name}: give one of {', '.join(Autopilot)}")
     pilot = None if name is None else Autopilot(str(name))
-    return Archive.with_options(world_options(given, at), pilot, files, returns, shown)
+    options = replace(world_options(given, at), wind=winds[0].value if winds else None)
+    return Archive.with_options(options, pilot, files, returns, shown)
 
 
 def world_options(given: dict[str, object], at: str | None = None) -> WorldOptions:

@@ -13,6 +13,7 @@ from rich.markup import escape
 from gcsplan.app.plan.way_home import warnings
 from gcsplan.check.verdict import by_item
 from gcsplan.cli.output.console import (
+    IN_WIND,
     aside,
     console,
     greatest,
@@ -30,7 +31,7 @@ from gcsplan.cli.output.console import (
 from gcsplan.figures import raised
 from gcsplan.mavlink.mission.return_parameters import setting
 from gcsplan.notes.note import Wording
-from gcsplan.units import KILOJOULE, METRIC, WATT_HOUR, Reach, Unit, Units, charge, duration
+from gcsplan.units import KILOJOULE, METRIC, WATT_HOUR, Reach, Unit, Units, charge, duration, span
 
 if TYPE_CHECKING:
     from gcsplan.check.returns.verdict import WayHome
@@ -93,6 +94,8 @@ def verdict_table(
             say(f"energy{mark}: {', '.join(used)}")
         else:
             say(", ".join([flight, *used]))
+        if (window_s := verdict.arrive_window_s()) is not None:
+            say(f"arrives {duration(verdict.arrive_s)} in still air, {IN_WIND} {span(window_s)}")
         say_extremes(verdict, units)
     say_notes(verdict.notes, wording)
 
