@@ -95,7 +95,7 @@ def judge(
     if times or wind or flight.loop_seq is not None or vehicle.energy.base_w:  # the battery depends on them
         clock = FlightTimes(flight.stretches, vehicle, world, home, radius_m)
         seconds = clock.seconds()
-        if wind is not None and not wind.declared.still:
+        if wind is not None and not wind.declared.still and _judged_in_wind(flight, vehicle):
             blown = FlightInWind(flight.stretches, clock, vehicle, wind, _agl_m(plane, report, len(flight.stretches)))
     costs = None if blown is None or blown.too_windy is not None else blown.costs
     figures = _figures(flight, plane, report, vehicle, world, seconds, costs)
@@ -121,6 +121,14 @@ def judge(
         in_wind=blown,
     )  # fmt: skip
     return _with_battery(verdict, vehicle, flight, costs)
+
+
+def _judged_in_wind(flight: Flight, vehicle: Vehicle) -> bool:
+    """Whether it is known what the vehicle does in a wind; why not, if not."""
+    if vehicle.autopilot is Autopilot.ARDUPLANE and not vehicle.keeps_airspeed:
+        flight.not_judged.append(Note("vtol_in_wind"))
+        return False
+    return True
 
 
 def _terms(mission: Mission, vehicle: Vehicle, *, in_wind: bool) -> Iterator[Note]:

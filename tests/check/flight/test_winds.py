@@ -95,6 +95,13 @@ def test_a_wind_too_strong_is_refused_with_one_that_was_tried() -> None:
     assert flown(blows((0, finding.limit + 0.2), (0, 360), varying=True)).safe is False
 
 
+def test_a_vtol_keeps_an_airspeed_and_its_flight_in_winds_is_not_judged() -> None:
+    verdict = flown(blows((5, 5), (90, 90)), vehicle(Autopilot.ARDUPLANE))
+    assert (verdict.safe, verdict.arrive_window_s()) == (None, None)
+    assert "vtol_in_wind" in {note.code for note in verdict.not_judged}
+    assert flown(blows((0, 0), (0, 0)), vehicle(Autopilot.ARDUPLANE)).safe is True
+
+
 def test_gusts_count_in_what_it_must_be_able_to_do_and_have_their_share() -> None:
     calm, gusty = window_of(flown(blows((5, 5), (90, 90)))), window_of(flown(blows((5, 5), (90, 90), gust_m_s=8.0)))
     assert gusty[1] > calm[1]
