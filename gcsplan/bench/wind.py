@@ -1,16 +1,19 @@
 """Rehearsed flights in declared winds: arrivals inside the windows of the plan, and the planned energies.
 
-Missions of copters and fixed wings over flat ground, each with another wind of one of `WIND_KINDS`, are planned,
-uploaded to simulated vehicles and flown `RUNS` times each, in winds and gusts drawn from what they declare. Then
-missions are flown in winds beyond these: each such flight arrives inside its window all the same, or is named
-as a violation.
+Missions of copters and fixed wings over flat ground, each with another wind of one of `WIND_KINDS` (forecasts too),
+are planned, uploaded to simulated vehicles and flown `RUNS` times each, in winds and gusts drawn from what they
+declare. Then missions are flown in winds beyond these: each such flight arrives inside its window all the same, or is
+named as a violation.
 """
 
 from __future__ import annotations
 
+import json
 import math
 from collections import Counter
 from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -25,11 +28,16 @@ from gcsplan.sim.outcome import Rehearsal
 
 RUNS = 20
 """Flights of each mission."""
-WIND_KINDS = ("constant", "range", "up to", "levels", "constant, varying", "range, varying", "up to, varying")
+WIND_KINDS = (
+    "constant", "range", "up to", "levels", "forecast", "constant, varying", "range, varying", "up to, varying",
+    "forecast, varying",
+)  # fmt: skip
 TIMES_STRONGER = 1.5, 2.0
 """How many times stronger than the declared wind one beyond it blows."""
 MOST_FLIGHTS = 100_000
 MIDDLE_DEG = 36.6, -84.3
+FORECAST_HOURS = [f"2026-11-28T{hour:02d}:00" for hour in range(9, 15)]
+FORECAST_AGL_M = 10, 80, 120
 BATTERY_J = 1e7
 ENERGY_SLACK = 1.002
 """Simulated motion and planned motion take the same energy up to this factor in still air."""
@@ -50,8 +58,9 @@ def run(
         number += 1
         if number > 10 * flights + 100:
             raise InputError(f"seed {seed}: too few missions can be planned")
-        kind, document = mission_of(seed, number)
-        planned = _planned(document, refused)
+        with TemporaryDirectory() as folder:
+            kind, document = mission_of(seed, number, Path(folder))
+            planned = _planned(document, refused)
         if planned is None:
             continue
         runs = min(RUNS, flights - flown)
@@ -114,8 +123,8 @@ def _beyond(planned: Plan, outside: Counter[str], runs: int, seed: int, faults: 
     return runs
 
 
-def mission_of(seed: int, number: int) -> tuple[str, dict[str, Any]]:
-    """The kind of the wind, and a mission file as read from YAML."""
+def mission_of(seed: int, number: int, folder: Path) -> tuple[str, dict[str, Any]]:
+    """The kind of the wind, and a mission file as read from YAML; a forecast is written into ``folder``."""
     rng = np.random.default_rng([seed, number])
     kind = WIND_KINDS[number % len(WIND_KINDS)]
     wing = bool(rng.random() < 0.5)
@@ -136,18 +145,27 @@ def mission_of(seed: int, number: int) -> tuple[str, dict[str, Any]]:
     document: dict[str, Any] = {
         "version": 1, "name": f"wind {number}", "terrain": {"flat_m": 300},
         "limits": {"min_agl_m": 60, "track_error_m": 10, "altitude_error_m": 8},
-        "wind": _wind(rng, kind, most), "vehicles": [vehicle],
+        "wind": _wind(rng, kind, most, folder), "vehicles": [vehicle],
         "no_fly": [{"name": "between", "center": between, "radius_m": round(float(rng.uniform(100.0, 400.0)))}],
     }  # fmt: skip
+    if "forecast" in document["wind"]:
+        document["at"] = [f"{FORECAST_HOURS[1]}Z", f"{FORECAST_HOURS[-2]}Z"]
+        vehicle["end"] = "land"  # a flight without an end is beyond every forecast
     return kind, document
 
 
-def _wind(rng: np.random.Generator, kind: str, most_m_s: float) -> dict[str, Any]:
+def _wind(rng: np.random.Generator, kind: str, most_m_s: float, folder: Path) -> dict[str, Any]:
     """The keys of a wind of one of `WIND_KINDS`, with gusts in every second one."""
     first = round(float(rng.uniform(0.0, 359.0)))
     form, *varying = kind.split(", ")
-    if form == "up to":
-        wind: dict[str, Any] = {"up_to_m_s": most_m_s}
+    if form == "forecast":
+        error_m_s = round(0.2 * most_m_s, 1)
+        (folder / "wind.json").write_text(json.dumps(_forecast(rng, most_m_s - error_m_s, first)))
+        wind: dict[str, Any] = {
+            "forecast": str(folder / "wind.json"), "speed_error_m_s": error_m_s, "from_error_deg": 15,
+        }  # fmt: skip
+    elif form == "up to":
+        wind = {"up_to_m_s": most_m_s}
     elif form == "levels":
         low = round(float(rng.uniform(0.0, most_m_s)), 1)
         wind = {"levels": [{"agl_m": 10, "speed_m_s": low, "from_deg": first},
@@ -160,6 +178,22 @@ def _wind(rng: np.random.Generator, kind: str, most_m_s: float) -> dict[str, Any
         }
     gusts = {"gust_m_s": round(most_m_s + float(rng.uniform(0.5, 3.0)), 1)} if rng.random() < 0.5 else {}
     return wind | gusts | ({"varying": True} if varying else {})
+
+
+def _forecast(rng: np.random.Generator, most_m_s: float, first_deg: float) -> dict[str, Any]:
+    """A forecast as Open-Meteo returns it: winds that turn and freshen with the hours and with the height."""
+    hourly: dict[str, list[Any]] = {"time": FORECAST_HOURS}
+    for k, agl_m in enumerate(FORECAST_AGL_M):
+        share = 0.6 + 0.2 * k
+        hourly[f"wind_speed_{agl_m}m"] = (share * rng.uniform(0.3, 1.0, len(FORECAST_HOURS)) * most_m_s).tolist()
+        turns_deg = np.cumsum(rng.uniform(-30.0, 30.0, len(FORECAST_HOURS))) + first_deg + 10.0 * k
+        hourly[f"wind_direction_{agl_m}m"] = (turns_deg % 360.0).tolist()
+    lat, lon = MIDDLE_DEG
+    units = {name: "°" if "direction" in name else "m/s" for name in hourly if name != "time"}
+    return {
+        "latitude": lat, "longitude": lon, "utc_offset_seconds": 0, "hourly_units": {"time": "iso8601"} | units,
+        "hourly": hourly,
+    }  # fmt: skip
 
 
 def report(result: dict[str, Any]) -> str:

@@ -66,8 +66,8 @@ CHECK_TEXTS = {
         "take-off is written {away_m:distance.0} from home; ArduCopter takes off where it stands"
     ),
     "vtol_in_wind": (
-        "an ArduPlane without {key:turn_radius_m} is taken for a VTOL, which keeps an airspeed between take-off and landing: "
-        "its flight in winds is not judged; give a fixed wing that key"
+        "an ArduPlane without {key:turn_radius_m} is taken for a VTOL, which keeps an airspeed between take-off and "
+        "landing: its flight in winds is not judged; give a fixed wing that key"
     ),
     "vtol_climbs_by_altitude": (
         "ArduPlane's VTOL take-off climbs by its altitude, whatever its frame, unless Q_OPTIONS says otherwise: only "

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from gcsplan.bench import wind
@@ -18,11 +20,11 @@ def test_flights_in_declared_winds_are_counted_and_ones_beyond_are_named() -> No
     assert "4 inside their windows" in wind.report(result)
 
 
-def test_missions_are_of_every_kind_and_the_same_for_a_seed() -> None:
-    made = [wind.mission_of(1, number) for number in range(40)]
+def test_missions_are_of_every_kind_and_the_same_for_a_seed(tmp_path: Path) -> None:
+    made = [wind.mission_of(1, number, tmp_path) for number in range(40)]
     assert {kind for kind, _ in made} == set(wind.WIND_KINDS)
     assert {document["vehicles"][0]["name"] for _, document in made} == {"copter", "wing"}
-    assert made[7] == wind.mission_of(1, 7)
+    assert made[7] == wind.mission_of(1, 7, tmp_path)
 
 
 def test_a_number_out_of_range_is_refused() -> None:

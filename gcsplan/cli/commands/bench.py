@@ -128,7 +128,7 @@ def bench_wind(
     quick: QuickOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Plan and rehearse copters and wings in constant winds, ranges, profiles, and winds that vary, with gusts.
+    """Plan and rehearse copters and wings in constant winds, ranges, profiles, forecasts, and winds that vary, with gusts.
 
     Count the arrivals inside the windows, and the flights that take more energy than is planned. The exit code is 4 if
     there is one outside or above.
