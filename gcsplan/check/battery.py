@@ -7,7 +7,7 @@ at most linear (`LegFigures.lead_j`), and the energy of the return is convex, be
 to the return's altitude are. So their sum exceeds a limit at most on two parts of a leg, one at each end, and bisection
 finds where it crosses the limit, without sampling.
 
-In declared winds all of this is for the worst of them, leg by leg, and for the return alone; it stays convex
+In declared winds all of this is for the worst of them, and the return for its own worst; it stays convex
 (`flight.winds.WaysHome`).
 """
 

@@ -97,7 +97,7 @@ def judge(
         seconds = clock.seconds()
         if wind is not None and not wind.declared.still and _judged_in_wind(flight, vehicle):
             blown = FlightInWind(flight.stretches, clock, vehicle, wind, _agl_m(plane, report, len(flight.stretches)))
-    costs = None if blown is None or blown.too_windy is not None else blown.costs
+    costs = None if blown is None or blown.too_windy is not None else blown.costs_so_far
     figures = _figures(flight, plane, report, vehicle, world, seconds, costs)
     findings += _blown_away(blown)
     findings += _findings(flight.stretches, plane, report, vehicle.limits, world)

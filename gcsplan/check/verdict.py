@@ -111,7 +111,7 @@ class Verdict:
     ``paper_energy``: energies count the paper's numbers, for the vehicle's own were not given. ``extent``: the greatest
     distances of the flight from home, errors counted; None where nothing was judged. ``in_wind``: the flight in the
     declared winds, None for still air; its windows are computed when they are read first. Times are in still air;
-    energies are those of the worst declared wind, leg by leg, or of still air where that takes more.
+    energies are those of the worst declared wind, or of still air where that takes more.
     """
 
     mission: Mission

@@ -103,7 +103,7 @@ PLAN_TEXTS = {
     ),
     "judged_in_wind": (
         "the aircraft can fly the mission in all declared winds; windows of times stand beside the times in still air, "
-        "energies are those of the worst wind on each leg, and a multicopter's corners are judged as in still air"
+        "energies are those of the worst wind, and a multicopter's corners are judged as in still air"
     ),
     "wind_too_strong": (
         "the aircraft cannot keep its track in a wind of {wind_m_s:speed.1} from {from_deg:.0f}°{gusts}; it can fly "

@@ -7,7 +7,7 @@ winds allow (`gcsplan.wind`). Columns are flown as in still air. [Winds](docs/co
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -41,6 +41,7 @@ distance by which turbulence displaces an aircraft."""
 
 LOW_FT, HIGH_FT, FOOT_M = 10.0, 1000.0, 0.3048
 _TRIED_STEPS = 12
+_TIMED_CELLS = 16
 _NO_RUN_M = 1e-6
 _RAYS = 64
 _RAY_RAD = 2.0 * math.pi / _RAYS
@@ -168,16 +169,33 @@ class FlightInWind:
     @cached_property
     def costs(self) -> Costs:
         """What each stretch takes at most with any wind of the set; no wind counts as a gain."""
+        return self._costs(lambda each: np.asarray(each.max(axis=0)))
+
+    @cached_property
+    def costs_so_far(self) -> Costs:
+        """As `costs`, but each stretch has what it adds to the most that the flight up to its end takes in one wind.
+
+        The sum up to the end of a stretch, or to a place on it, is the most in any wind of the set; the sum from there
+        to the end is none. Where the wind varies, or a part is flown again, it is `costs`.
+        """
+        if self.wind.varying or any(s.times > 1 or s.jumped_from is not None for s in self.stretches):
+            return self.costs
+        return self._costs(lambda each: np.diff(np.cumsum(each, axis=1).max(axis=0), prepend=0.0))
+
+    def _costs(self, most: Callable[[Floats], Floats]) -> Costs:
+        """The costs; ``most`` makes those of the set, (N,), from those of each cell of its winds, (K, N)."""
         # Without a forecast the window, which is a search, is not needed here.
         hours_s = self._timed[1] if len(self.wind.times_s) > 1 else self._any_hour
         along, cells = self._along(self.wind, hours_s), cover(self.wind)
-        air, _ = (c.max(axis=0) for c in along.costs(cells))
-        slow = along.speeds_m_s(cells)[0].min(axis=0)
-        moving_s = np.maximum(self.times.seconds(slow) + (not self.wind.single) * self._uneven_s, self._still_s)
+        air, slows = along.costs(cells)[0], along.speeds_m_s(cells)[0]
+        slow = slows.min(axis=0)
+        moving_s = self._moving_s(slow)
         late_s, _ = self._gust_s(along, self.between(slow, slow).latest_s)
         later_s = np.diff(late_s, prepend=0.0) / self._rounds
         stretch, count = self._parts.stretch, len(self.stretches)
-        air_m = np.bincount(stretch, weights=self._run_m * np.maximum(air, 1.0), minlength=count)
+        air_m = most(
+            np.array([np.bincount(stretch, weights=w, minlength=count) for w in self._run_m * np.maximum(air, 1.0)])
+        )
         fastest = np.zeros(count)
         np.maximum.at(fastest, stretch, self._ability.most_air_m_s)
         wind_m_s = self._places(self.wind).strongest_m_s(cells)
@@ -186,7 +204,15 @@ class FlightInWind:
         uneven_s = np.maximum(moving_s - even[0], self._still_s - even[1]) + self._uneven_s
         blown_m = np.maximum(uneven_s, 0.0) * (0.0 if self.vehicle.keeps_airspeed else wind_m_s)
         blown_m += self._gust_air_m(moving_s)
+        if self.vehicle.energy.base_w and len(cells) > 1:  # else times cost nothing
+            groups = np.array_split(slows, _TIMED_CELLS)
+            moving_s = most(np.array([self._moving_s(group.min(axis=0)) for group in groups]))
         return Costs(air_m + blown_m + later_s * fastest, moving_s + later_s, self._held_s[1], wind_m_s)
+
+    def _moving_s(self, slow_m_s: Floats) -> Floats:
+        """(N,) the most seconds of each stretch, if no part is flown slower than this, and none earlier than in still
+        air."""
+        return np.maximum(self.times.seconds(slow_m_s) + (not self.wind.single) * self._uneven_s, self._still_s)
 
     @cached_property
     def _held_s(self) -> tuple[Floats, Floats]:

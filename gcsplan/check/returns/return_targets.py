@@ -223,7 +223,7 @@ class _Finder:
                 blown = FlightInWind(stretches, clock, self.vehicle, self.wind, unknown)
                 if blown.too_windy is not None:
                     return math.inf
-                costs = blown.costs
+                costs = blown.costs_so_far
                 air_m, times, hold_s, wind_m_s = costs.air_m, costs.seconds, costs.hold_s, costs.wind_m_s
         rise_m = [abs(s.end[2] - s.start[2]) for s in stretches]
         rows = zip(rise_m, air_m.tolist(), times.tolist(), hold_s.tolist(), wind_m_s.tolist(), strict=True)

@@ -128,10 +128,10 @@ def bench_wind(
     quick: QuickOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Plan and rehearse copters and wings in constant winds, ranges, profiles, forecasts, and winds that vary, with gusts.
+    """Plan and rehearse copters and wings in constant winds, ranges, profiles, forecasts, and winds that vary.
 
-    Count the arrivals inside the windows, and the flights that take more energy than is planned. The exit code is 4 if
-    there is one outside or above.
+    Gusts blow in half of the missions. Count the arrivals inside the windows, and the flights that take more energy
+    than is planned. The exit code is 4 if there is one outside or above.
     """
     from gcsplan.bench import wind as bench
     from gcsplan.cli.output.console import remark
