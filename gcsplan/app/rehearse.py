@@ -39,6 +39,7 @@ __all__ = [
     "Rehearsal",
     "RehearsalPart",
     "Terms",
+    "late_of",
     "parameters_of",
     "parts_of",
     "rehearse",
@@ -47,6 +48,10 @@ __all__ = [
     "terms_of",
     "weather_of",
 ]
+
+
+MOST_LATE_S = 86_400.0
+"""Most seconds by which a vehicle may depart late in a rehearsal."""
 
 
 def parts_of(planned: Plan) -> list[RehearsalPart]:
@@ -76,7 +81,7 @@ def terms_of(planned: Plan) -> Terms:
         return Terms()
     order = planned.fleet.order if planned.fleet is not None and arrival.mode == "sequence" else ()
     pad_clear_s = math.inf if arrival.pad_clear_s is None else arrival.pad_clear_s
-    return Terms(order, arrival.separation_m, pad_clear_s)
+    return Terms(order, arrival.separation_m, pad_clear_s, arrival.window_s)
 
 
 def weather_of(
@@ -99,6 +104,7 @@ def rehearse(
     seed: int = 1,
     airspeed_m_s: float | None = None,
     parameters: Mapping[str, Mapping[str, float]] = MappingProxyType({}),
+    late_s: Mapping[str, float] = MappingProxyType({}),
     progress: Callable[[int, int], None] | None = None,
     jobs: int | None = 1,
     cluster: Any = None,
@@ -108,12 +114,14 @@ def rehearse(
 
     ``jobs`` processes or the workers of ``cluster`` share the runs (`executor`); a few runs are flown in this process.
     The result does not depend on it. ``parameters``: by vehicle, the parameters that it flies with in place of
-    the assumed ones; the plan stays. ``watch`` is called with the executor before the work begins.
+    the assumed ones; the plan stays. ``late_s``: by vehicle, how much later than planned it departs. ``watch`` is
+    called with the executor before the work begins.
     """
     from gcsplan.sim.rehearsal import concluded, different, flown, prepared
 
     flights = prepared(
-        [_set_up(part, parameters.get(part.vehicle.name, {})) for part in parts_of(planned)], planned.world,
+        [_set_up(part, parameters.get(name := part.vehicle.name, {}), late_s.get(name, 0.0))
+         for part in parts_of(planned)], planned.world,
         terms_of(planned), weather=weather, runs=runs, seed=seed, airspeed_m_s=airspeed_m_s,
     )  # fmt: skip
     count = different(flights, runs)
@@ -146,8 +154,9 @@ def _outside(planned: Plan, parameters: Mapping[str, Mapping[str, float]], resul
     return replace(result, vehicles=tuple(vehicles), notes=tuple(notes))
 
 
-def _set_up(part: RehearsalPart, values: Mapping[str, float]) -> RehearsalPart:
-    """``part``, flown as these parameters make the vehicle fly."""
+def _set_up(part: RehearsalPart, values: Mapping[str, float], late_s: float) -> RehearsalPart:
+    """``part``, flown as these parameters make the vehicle fly, and so late."""
+    part = replace(part, late_s=late_s)
     if not values:
         return part
     returns_m = return_on_board_m(values)
@@ -155,6 +164,25 @@ def _set_up(part: RehearsalPart, values: Mapping[str, float]) -> RehearsalPart:
         part, vehicle=vehicle_on_board(part.vehicle, part.mission, values),
         rtl_rel_home_m=part.rtl_rel_home_m if returns_m is None or part.rtl_rel_home_m is None else returns_m,
     )  # fmt: skip
+
+
+def late_of(words: Sequence[str], names: Sequence[str]) -> dict[str, float]:
+    """Vehicle to seconds from the ``--late`` words NAME=SECONDS. Raises UsageError."""
+    found: dict[str, float] = {}
+    for word in words:
+        name, _, text = word.partition("=")
+        try:
+            seconds = float(text)
+        except ValueError:
+            seconds = math.nan
+        if not 0.0 <= seconds <= MOST_LATE_S:
+            raise UsageError(f"--late {word}: give NAME=SECONDS, from 0 to {MOST_LATE_S:.0f}, such as uav2=40")
+        if name not in names:
+            raise UsageError(f"--late {word}: the mission file has no vehicle {name!r}; it has {', '.join(names)}")
+        if name in found:
+            raise UsageError(f"--late is given twice for {name}; keep one")
+        found[name] = seconds
+    return found
 
 
 def parameters_of(words: Sequence[str], planned: Plan) -> dict[str, Mapping[str, float]]:

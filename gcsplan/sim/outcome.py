@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -39,6 +40,7 @@ class RehearsalPart:
     ``depart_s``, ``arrive_s``: seconds since the fleet's common start; ``arrive_s`` is None if none is planned.
     ``window_s``: the earliest and the latest arrival over the declared winds; None: planned in still air alone.
     ``airborne``: it begins at the top of its take-off (missions from papers); ``leaves``: it is gone when it arrives.
+    ``late_s``: how much later than planned it departs.
     """
 
     vehicle: Vehicle
@@ -50,6 +52,12 @@ class RehearsalPart:
     airborne: bool = False
     leaves: bool = False
     window_s: tuple[float, float] | None = None
+    late_s: float = 0.0
+
+    @property
+    def leaves_s(self) -> float:
+        """When it departs, seconds since the fleet's common start."""
+        return self.depart_s + self.late_s
 
     @property
     def planned_s(self) -> tuple[float, float] | None:
@@ -64,7 +72,7 @@ def lateness(part: RehearsalPart, trace: Trace) -> tuple[Note, float] | None:
     """How much too late a flight came to its goal or to its end, also in seconds; None if it did not."""
     if part.planned_s is None or not math.isfinite(trace.arrive_s):
         return None
-    flown_s = trace.arrive_s - part.depart_s, trace.end_s - part.depart_s
+    flown_s = trace.arrive_s - part.leaves_s, trace.end_s - part.leaves_s
     worst: tuple[Note, float] | None = None
     for arrived, planned, took in zip((True, False), part.planned_s, flown_s, strict=True):
         late_s = took - planned
@@ -109,11 +117,13 @@ class Terms:
     """The requirements of a fleet.
 
     ``order``: names in the required order of arrival, empty if any order is allowed. ``separation_m`` None: the least
-    distance is reported but not judged. ``pad_clear_s``: seconds for which a landed vehicle blocks its place."""
+    distance is reported but not judged. ``pad_clear_s``: seconds for which a landed vehicle blocks its place.
+    ``window_s``: how much an interval between two arrivals in this order may differ from the planned one."""
 
     order: tuple[str, ...] = ()
     separation_m: float | None = None
     pad_clear_s: float = math.inf
+    window_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,13 +166,15 @@ class Performance:
     not_flown: tuple[Note, ...] = ()
     paper_energy: bool = False
     window_s: tuple[float, float] | None = None
+    late_s: float = 0.0
 
     @property
     def inside_runs(self) -> int | None:
-        """In how many runs it arrived inside its window; None without one."""
+        """In how many runs it arrived inside its window, of its late departure if that is late; None without one."""
         if self.window_s is None:
             return None
-        return sum(math.isfinite(a) and not outside_s(self.window_s, self.depart_s, a) for a in self.arrive_s)
+        came = [a - self.late_s for a in self.arrive_s]
+        return sum(math.isfinite(a) and not outside_s(self.window_s, self.depart_s, a) for a in came)
 
     @property
     def errors_s(self) -> tuple[float, ...]:
@@ -181,7 +193,8 @@ class Performance:
         errors = self.errors_s
         worst = max(errors, key=abs, default=None)
         return {
-            "name": self.name, "depart_s": self.depart_s, "planned_arrive_s": self.planned_s,
+            "name": self.name, "depart_s": self.depart_s, **({"late_s": self.late_s} if self.late_s else {}),
+            "planned_arrive_s": self.planned_s,
             "arrive_s": _number(_median(self.arrive_s)), "error_s": _number(_median(errors)),
             "p95_error_s": _number(self.p95_s), "worst_error_s": _number(worst),
             "end_s": _number(_median(self.end_s)), "min_agl_m": _number(self.min_agl_m),
@@ -203,7 +216,7 @@ class Performance:
         def clock(value: float | None) -> str:
             return duration(value, decimals) if value is None or math.isfinite(value) else "never"
 
-        row = {"vehicle": self.name, "leaves": clock(self.depart_s), "planned": clock(self.planned_s)}
+        row = {"vehicle": self.name, "leaves": clock(self.depart_s + self.late_s), "planned": clock(self.planned_s)}
         if self.window_s is not None:
             row["window"] = " – ".join(map(clock, self.window_s))
         arrived = _median(self.arrive_s)
@@ -226,8 +239,10 @@ class Rehearsal:
     """The result of a rehearsal.
 
     ``closest``: the nearest approach of any two vehicles in any run, None if no two flew at the same time.
-    ``simulator``: ``gcsplan`` or ``sitl``. ``weather``: the simulated weather, for output. ``flown``: the flown
-    paths of the first run, in the order of ``vehicles``.
+    ``intervals_kept_runs``: in how many runs all intervals between arrivals in the planned order were as planned, up to
+    the terms' ``window_s`` and `WINDOW_S`; ``interval_error_s``: how much longer (shorter: negative) than planned the
+    worst was, None without an order. ``simulator``: ``gcsplan`` or ``sitl``. ``weather``: the simulated weather, for
+    output. ``flown``: the flown paths of the first run, in the order of ``vehicles``.
     """
 
     simulator: str
@@ -243,6 +258,8 @@ class Rehearsal:
     breaches: tuple[Breach, ...]
     notes: tuple[Note, ...] = ()
     flown: tuple[Trace, ...] = field(default=(), compare=False, repr=False)
+    intervals_kept_runs: int = 0
+    interval_error_s: float | None = None
 
     @property
     def not_judged(self) -> tuple[Note, ...]:
@@ -290,6 +307,8 @@ class Rehearsal:
             "fleet": {
                 "order": list(self.terms.order), "order_flown": list(self.order_flown),
                 "order_kept_runs": self.order_kept_runs if self.terms.order else None,
+                "intervals_kept_runs": self.intervals_kept_runs if self.terms.order else None,
+                "worst_interval_error_s": _number(self.interval_error_s),
                 "separation_m": self.terms.separation_m,
                 "min_separation_m": None if self.closest is None else _number(self.closest.distance_m),
                 "closest": closest,
@@ -334,6 +353,8 @@ class Tally:
     terms: Terms
     runs: int = 0
     order_kept: int = 0
+    intervals_kept: int = 0
+    interval_error_s: float = 0.0
     separation_kept: int = 0
     closest: Meeting | None = None
     order_flown: tuple[str, ...] = ()
@@ -368,7 +389,9 @@ class Tally:
             self._battery(part, spent_j[i])
             if (late := lateness(part, trace)) is not None:
                 self.breach("late", (trace.name,), *late)
-            if part.window_s is not None and (off_s := outside_s(part.window_s, part.depart_s, trace.arrive_s)):
+            if part.window_s is not None and (
+                off_s := outside_s(part.window_s, part.depart_s, trace.arrive_s - part.late_s)
+            ):
                 earliest_s, latest_s = (at - part.depart_s for at in part.window_s)
                 outside = Note(
                     "arrived_outside_window", name=trace.name, off_s=abs(off_s), late=off_s > 0.0,
@@ -378,6 +401,7 @@ class Tally:
             for f in judged.findings:
                 self.breach(f.kind, (trace.name,), f.note, f.by, f.zone)
         self._order(traces)
+        self._intervals(traces)
         self._separation(traces)
 
     def join(self, later: Tally) -> None:
@@ -398,6 +422,8 @@ class Tally:
         self.flown = self.flown or later.flown
         self.runs += later.runs
         self.order_kept += later.order_kept
+        self.intervals_kept += later.intervals_kept
+        self.interval_error_s = max(self.interval_error_s, later.interval_error_s, key=abs)
         self.separation_kept += later.separation_kept
         self._nearer(later.closest)
         self.notes += later.notes
@@ -446,6 +472,16 @@ class Tally:
         self.order_flown = tuple(came)
         self.breach("order", (), Note("order_lost", came=tuple(came), planned=tuple(planned)), 1.0)
 
+    def _intervals(self, traces: Sequence[Trace]) -> None:
+        """Compare the times between the arrivals in the planned order with the planned ones."""
+        late_s = {t.name: t.arrive_s - (p.arrive_s or 0.0) for p, t in zip(self.parts, traces, strict=True)}
+        off_s = [late_s[after] - late_s[before] for before, after in pairwise(self.terms.order)]
+        off_s = [off if math.isfinite(off) else math.inf for off in off_s]
+        if off_s:
+            worst_s = max(off_s, key=abs)
+            self.intervals_kept += abs(worst_s) <= self.terms.window_s + WINDOW_S
+            self.interval_error_s = max(self.interval_error_s, worst_s, key=abs)
+
     def _separation(self, traces: Sequence[Trace]) -> None:
         needed = self.terms.separation_m
         found = meetings(traces, needed or 0.0, MEETING_STEP_S, pad_clear_s=self.terms.pad_clear_s)
@@ -470,11 +506,12 @@ class Tally:
                     part.vehicle.name, part.depart_s, part.arrive_s, tuple(self._arrive[i]), tuple(self._end[i]),
                     math.nan if low is None else low.min_agl_m, (math.nan, math.nan) if low is None else low.min_agl_at,
                     self._used_percent(part, self.most_j[i]), not_flown[i], part.vehicle.energy.papers,
-                    part.window_s,
+                    part.window_s, part.late_s,
                 )
             )  # fmt: skip
         breaches = sorted(self._breaches.values(), key=lambda b: (-b.runs, b.kind, b.vehicles))
         return Rehearsal(
             simulator, self.runs, seed, weather, tuple(performances), self.terms, self.order_flown, self.order_kept,
             self.separation_kept, self.closest, tuple(breaches), tuple(dict.fromkeys(self.notes)), self.flown,
+            self.intervals_kept, self.interval_error_s if len(self.terms.order) > 1 else None,
         )  # fmt: skip

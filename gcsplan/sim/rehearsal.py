@@ -60,7 +60,7 @@ class Flights:
     @property
     def run_s(self) -> float:
         """Seconds of processor time that a run takes, about, in a block as large as they get."""
-        flown_s = max(p.depart_s + p.verdict.time_s for p in self.parts)
+        flown_s = max(p.leaves_s + p.verdict.time_s for p in self.parts)
         most = max(1, MOST_LANES // len(self.parts))
         return LANE_S * len(self.parts) + STEPS_S * flown_s / most if math.isfinite(flown_s) else LANE_S
 
@@ -127,7 +127,7 @@ def flown(flights: Flights, world: World, block: RunBlock) -> Tally:
     first, count = block
     parts = flights.parts
     tally = Tally(parts, flights.terms)
-    departs = [part.depart_s for part in parts]
+    departs = [part.leaves_s for part in parts]
     flight = fly(flights.tracks, departs, weather=flights.weather, runs=count, seed=flights.seed, first_run=first)
     for r in range(count):
         lanes = range(r * len(parts), (r + 1) * len(parts))

@@ -18,7 +18,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mav
 from gcsplan.app.fleet.pipeline import plan
 from gcsplan.app.parallel.executor import Inline
 from gcsplan.app.plan.model import Plan
-from gcsplan.app.rehearse import parts_of, rehearse, rehearse_in_sitl, seats_of, terms_of, weather_of
+from gcsplan.app.rehearse import late_of, parts_of, rehearse, rehearse_in_sitl, seats_of, terms_of, weather_of
 from gcsplan.errors import CheckFailed, LinkError, UsageError, VehicleRefused
 from gcsplan.mission_file import load_mission
 from gcsplan.sim.flight.mission_flight import fly
@@ -100,12 +100,33 @@ def test_a_planned_fleet_arrives_within_half_a_second_of_its_plan_in_order_and_a
     result = rehearse(planned)
     assert result.safe
     assert result.order_flown == terms.order
+    assert result.intervals_kept_runs == 1
+    assert abs(result.interval_error_s or 0.0) < 0.5
     assert all(abs(v.errors_s[0]) < 0.5 for v in result.vehicles)
     arrivals = [dict(zip([v.name for v in result.vehicles], result.vehicles, strict=True))[n] for n in terms.order]
     gaps = [b.arrive_s[0] - a.arrive_s[0] for a, b in pairwise(arrivals)]
     assert gaps == pytest.approx([8.0, 8.0], abs=0.5)
     assert result.closest is not None
     assert result.closest.distance_m > 30.0
+
+
+@pytest.mark.slow
+def test_a_late_vehicle_is_judged_by_its_own_departure_and_the_fleet_by_its_plan(planned: Plan) -> None:
+    late = rehearse(planned, late_s={"uav1": 5.0})
+    assert (late.intervals_kept_runs, late.order_kept_runs) == (0, 1)
+    assert abs(late.interval_error_s or 0.0) == pytest.approx(5.0, abs=0.5)
+    assert [v.errors_s[0] for v in late.vehicles] == pytest.approx([5.0, 0.0, 0.0], abs=0.5)
+    assert late.as_dict()["vehicles"][0]["late_s"] == 5.0
+    lost = rehearse(planned, late_s={"uav1": 20.0})
+    assert "order" in {breach.kind for breach in lost.breaches}
+    assert "late" not in {breach.kind for breach in lost.breaches}
+
+
+def test_late_departures_are_read_by_name() -> None:
+    assert late_of(["uav2=40", "uav1=0.5"], ["uav1", "uav2"]) == {"uav1": 0.5, "uav2": 40.0}
+    for words in (["uav3=1"], ["uav1=-1"], ["uav1=nan"], ["40"], ["uav1=1", "uav1=2"]):
+        with pytest.raises(UsageError, match="--late"):
+            late_of(words, ["uav1", "uav2"])
 
 
 # -- autopilots that fly by themselves --------------------------------------------------------------------------------

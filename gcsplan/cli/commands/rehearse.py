@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -78,6 +79,10 @@ def rehearse(
             help="Fly with these parameters in place of what the plan assumes: a .param file, or a vehicle to read.",
         ),
     ] = None,
+    late: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME=S", help="A vehicle departs so many seconds late; may be repeated for others."),
+    ] = None,
     jobs: JobsOption = None,
     cluster: ClusterOption = None,
     speedup: Annotated[
@@ -123,12 +128,14 @@ def rehearse(
         raise UsageError("--noise-m, --airspeed and --runs are the built-in simulator's, not --sitl's")
     if speedup is not None and sitl_binary is None:
         raise UsageError("--speedup goes with --sitl-binary")
+    if in_sitl and late:
+        raise UsageError("--late is the built-in simulator's: release an SITL's vehicle late by hand")
     if in_sitl and params:
         raise UsageError("--params is the built-in simulator's: an SITL has parameters of its own")
     source = pipeline.load_mission(mission, at=at)
     weather = rehearsing.weather_of(source, wind, wind_from, gusts, noise_m)
     names = [r.vehicle.name for r in source.vehicles]
-    addresses = rehearsing.seats_of(sitl or [], names)
+    addresses, late_s = rehearsing.seats_of(sitl or [], names), rehearsing.late_of(late or [], names)
     with planning_display(names, source.planner.objective) as progress:
         planned = pipeline.plan(source, planner=planner, progress=progress, jobs=jobs, cluster=cluster)
     planned, homes = flyable(
@@ -144,7 +151,7 @@ def rehearse(
         display = WorkDisplay(runs, "runs")
         result = rehearsing.rehearse(
             planned, weather=weather, runs=runs, seed=seed, airspeed_m_s=airspeed, jobs=jobs, cluster=cluster,
-            parameters=rehearsing.parameters_of(params or [], planned), watch=display.workers,
+            parameters=rehearsing.parameters_of(params or [], planned), late_s=late_s, watch=display.workers,
             progress=lambda done, _: display.done(done),
         )  # fmt: skip
     error: GcsplanError | None = result.error(allow_unjudged=allow_unjudged)
@@ -180,11 +187,19 @@ def _show(planned: Plan, result: Rehearsal, units: Units) -> None:
 
 
 def _ending(result: Rehearsal, units: Units) -> list[str]:
-    """Order, separation and violations in words."""
+    """Order, intervals, separation and violations in words."""
+    from gcsplan.sim.outcome import WINDOW_S
+
     lines = []
     kept = f" in {result.order_kept_runs} of {result.runs} runs" if result.runs > 1 else ""
     if result.terms.order and (result.order_kept_runs or result.runs > 1):
         lines.append(f"order of arrival {', '.join(result.terms.order)}: kept{kept}")
+    if result.interval_error_s is not None:
+        off_s, runs = result.interval_error_s, f" in {result.intervals_kept_runs} of {result.runs} runs"
+        allowed = f"intervals between arrivals within {result.terms.window_s + WINDOW_S:g} s of the plan"
+        off = f"the worst is {abs(off_s):.1f} s too {'long' if off_s > 0.0 else 'short'}"
+        kept = f"kept{runs if result.runs > 1 else ''}" if result.intervals_kept_runs else "not kept"
+        lines.append(f"{allowed}: {kept}; {off if math.isfinite(off_s) else 'one never arrived'}")
     if result.closest is not None:
         a, b = result.closest.names
         apart = Quantity(result.closest.distance_m, "distance", 1, "down").text(units)
