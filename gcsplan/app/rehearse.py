@@ -96,7 +96,7 @@ def weather_of(
     return Weather(wind_m_s or 0.0, from_deg, gusts_m_s, noise_m)
 
 
-def rehearse(
+def rehearse(  # noqa: PLR0913 - options by name, each with a default
     planned: Plan,
     *,
     weather: Weather | None = None,

@@ -4,6 +4,10 @@ Missions of copters and fixed wings over flat ground, each with another wind of 
 are planned, uploaded to simulated vehicles and flown `RUNS` times each, in winds and gusts drawn from what they
 declare. Then missions are flown in winds beyond these: each such flight arrives inside its window all the same, or is
 named as a violation.
+
+Fleets of 2 to 8 vehicles, copters and wings mixed, arrive in sequence in such winds. Counted are the runs in which the
+order, every interval up to `window_s`, and the separation are kept. A plan that does not say that its time table holds
+in still air alone, and whose fleet loses one of them, is a fault.
 """
 
 from __future__ import annotations
@@ -11,7 +15,7 @@ from __future__ import annotations
 import json
 import math
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -39,6 +43,9 @@ MIDDLE_DEG = 36.6, -84.3
 FORECAST_HOURS = [f"2026-11-28T{hour:02d}:00" for hour in range(9, 15)]
 FORECAST_AGL_M = 10, 80, 120
 BATTERY_J = 1e7
+RUNS_OF_FLEET = 5
+LANES_APART_DEG = 0.008
+"""Distance of the starts, and of the goals, of neighbours in a fleet: 710 m or more, as wings circle at their goals."""
 ENERGY_SLACK = 1.002
 """Simulated motion and planned motion take the same energy up to this factor in still air."""
 
@@ -79,6 +86,40 @@ def run(
     }  # fmt: skip
 
 
+def run_fleets(fleets: int, *, seed: int = 1, tell: Callable[[str], None] | None = None) -> dict[str, Any]:
+    """Fly fleets; ``tell`` as in `run`. Raises InputError for a number out of range."""
+    if not 1 <= fleets <= MOST_FLIGHTS:
+        raise InputError(f"give 1 to {MOST_FLIGHTS} fleets, not {fleets}")
+    rows: dict[str, Counter[str]] = {}
+    refused: Counter[str] = Counter()
+    faults: list[str] = []
+    for number in range(1, fleets + 1):
+        with TemporaryDirectory() as folder:
+            kind, document = fleet_of(seed, number, Path(folder))
+            planned = _planned(document, refused)
+        if planned is None:
+            continue
+        weather = weather_of(planned.source, None, None, 0.0, 0.0)
+        result = rehearse(planned, weather=weather, runs=RUNS_OF_FLEET, seed=number)
+        kept = {
+            "order": result.order_kept_runs, "intervals": result.intervals_kept_runs,
+            "separation": result.separation_kept_runs,
+        }  # fmt: skip
+        still = any(note.code == "schedule_in_still_air" for note in planned.notes)
+        row = rows.setdefault(kind, Counter())
+        row.update(fleets=1, runs=RUNS_OF_FLEET, in_still_air=still, held=min(kept.values()) == RUNS_OF_FLEET, **kept)
+        if not still:
+            named = f"seed {seed}, fleet {number} ({kind})"
+            lost = [f"{what} kept in {count} of {RUNS_OF_FLEET} runs" for what, count in kept.items()]
+            faults += [f"{named}: {words}" for words, n in zip(lost, kept.values(), strict=True) if n < RUNS_OF_FLEET]
+        if tell is not None and number % 10 == 0:
+            tell(f"{number} of {fleets} fleets, {len(faults)} faults")
+    return {
+        "fleets": fleets, "seed": seed, "refused": dict(refused), "faults": faults,
+        "kinds": {kind: dict(row) for kind, row in sorted(rows.items())},
+    }  # fmt: skip
+
+
 def _planned(document: dict[str, Any], refused: Counter[str]) -> Plan | None:
     """The plan of a mission that passes; None, and why, of any other."""
     try:
@@ -86,10 +127,10 @@ def _planned(document: dict[str, Any], refused: Counter[str]) -> Plan | None:
     except NoMission as refusal:
         refused[refusal.reason] += 1
         return None
-    verdict = planned.vehicles[0].verdict
-    if verdict.safe is not True:
-        refused[verdict.findings[0].kind if verdict.findings else "not judged"] += 1
-        return None
+    for v in planned.vehicles:
+        if v.verdict.safe is not True:
+            refused[v.verdict.findings[0].kind if v.verdict.findings else "not judged"] += 1
+            return None
     return planned
 
 
@@ -127,31 +168,78 @@ def mission_of(seed: int, number: int, folder: Path) -> tuple[str, dict[str, Any
     """The kind of the wind, and a mission file as read from YAML; a forecast is written into ``folder``."""
     rng = np.random.default_rng([seed, number])
     kind = WIND_KINDS[number % len(WIND_KINDS)]
+    vehicle = _vehicle(rng, 1, MIDDLE_DEG)
+    most = _most_m_s(rng, [vehicle])
+    between = [round(0.5 * (a + b), 6) for a, b in zip(MIDDLE_DEG, vehicle["goal"], strict=True)]
+    document = _document(rng, f"wind {number}", kind, most, [vehicle], folder)
+    document["no_fly"] = [{"name": "between", "center": between, "radius_m": round(float(rng.uniform(100.0, 400.0)))}]
+    return kind, document
+
+
+def fleet_of(seed: int, number: int, folder: Path) -> tuple[str, dict[str, Any]]:
+    """As `mission_of`, of a fleet that arrives in sequence: each flies beside its neighbour, to a goal of its own."""
+    rng = np.random.default_rng([seed, number, 1])
+    kind = WIND_KINDS[number % len(WIND_KINDS)]
+    turn, away_m = float(rng.uniform(0.0, 2.0 * math.pi)), float(rng.uniform(2000.0, 4500.0))
+    vehicles = []
+    for k in range(int(rng.integers(2, 9))):
+        aside = k * LANES_APART_DEG
+        start = (round(MIDDLE_DEG[0] - aside * math.cos(turn), 6), round(MIDDLE_DEG[1] + aside * math.sin(turn), 6))
+        vehicles.append(_vehicle(rng, k + 1, start, turn, away_m))
+    document = _document(rng, f"fleet {number}", kind, _most_m_s(rng, vehicles), vehicles, folder)
+    document["arrival"] = {
+        "mode": "sequence", "order": "best", "clock": "fleet", "separation_m": 50,
+        "interval_s": round(float(rng.uniform(20.0, 60.0))), "window_s": round(float(rng.uniform(2.0, 10.0))),
+    }  # fmt: skip
+    return kind, document
+
+
+def _vehicle(
+    rng: np.random.Generator, sysid: int, start_deg: tuple[float, float], turn: float | None = None,
+    away_m: float = math.nan,
+) -> dict[str, Any]:  # fmt: skip
+    """A copter or a wing, to a goal in a direction and at a distance that are drawn, or given."""
     wing = bool(rng.random() < 0.5)
     speed = round(float(rng.uniform(16.0, 24.0) if wing else rng.uniform(5.0, 10.0)), 1)
-    most = round(float(rng.uniform(1.0, 0.35 * speed if wing else 6.0)), 1)
-    turn, away_m = float(rng.uniform(0.0, 2.0 * math.pi)), float(rng.uniform(2000.0, 4500.0))
-    goal = (
-        round(MIDDLE_DEG[0] + away_m * math.sin(turn) / 111_000.0, 6),
-        round(MIDDLE_DEG[1] + away_m * math.cos(turn) / 89_000.0, 6),
-    )
-    between = [round(0.5 * (a + b), 6) for a, b in zip(MIDDLE_DEG, goal, strict=True)]
+    slowest = speed
+    if turn is None:
+        turn, away_m = float(rng.uniform(0.0, 2.0 * math.pi)), float(rng.uniform(2000.0, 4500.0))
+    else:
+        slowest = round(0.8 * speed, 1)
+    goal = [
+        round(start_deg[0] + away_m * math.sin(turn) / 111_000.0, 6),
+        round(start_deg[1] + away_m * math.cos(turn) / 89_000.0, 6),
+    ]
     vehicle: dict[str, Any] = {
-        "name": "wing" if wing else "copter", "sysid": 1, "autopilot": "arduplane" if wing else "arducopter",
-        "start": list(MIDDLE_DEG), "goal": list(goal), "speed_m_s": [speed, speed],
+        "name": f"{'wing' if wing else 'copter'}{'' if sysid == 1 else sysid}", "sysid": sysid,
+        "autopilot": "arduplane" if wing else "arducopter", "start": list(start_deg), "goal": goal,
+        "speed_m_s": [slowest, speed],
         "energy": {"battery_j": BATTERY_J, "reserve": 0.1, "horizontal_j_per_m": 100, "vertical_j_per_m": 120},
     }  # fmt: skip
-    vehicle |= {"turn_radius_m": math.ceil(speed**2 / 3.0), "end": "loiter"} if wing else {"lean_angle_deg": 45}
+    own = {"turn_radius_m": math.ceil(speed**2 / 3.0), "end": "loiter"} if wing else {"lean_angle_deg": 45}
+    return vehicle | own
+
+
+def _most_m_s(rng: np.random.Generator, vehicles: Sequence[dict[str, Any]]) -> float:
+    """The fastest wind of a mission, in which all of its vehicles can fly."""
+    copters = any(v["autopilot"] == "arducopter" for v in vehicles)
+    slowest = min((v["speed_m_s"][0] for v in vehicles if v["autopilot"] == "arduplane"), default=math.inf)
+    return round(float(rng.uniform(1.0, min(0.35 * slowest, 6.0 if copters else 8.4))), 1)
+
+
+def _document(
+    rng: np.random.Generator, name: str, kind: str, most_m_s: float, vehicles: list[dict[str, Any]], folder: Path
+) -> dict[str, Any]:
     document: dict[str, Any] = {
-        "version": 1, "name": f"wind {number}", "terrain": {"flat_m": 300},
+        "version": 1, "name": name, "terrain": {"flat_m": 300},
         "limits": {"min_agl_m": 60, "track_error_m": 10, "altitude_error_m": 8},
-        "wind": _wind(rng, kind, most, folder), "vehicles": [vehicle],
-        "no_fly": [{"name": "between", "center": between, "radius_m": round(float(rng.uniform(100.0, 400.0)))}],
+        "wind": _wind(rng, kind, most_m_s, folder), "vehicles": vehicles,
     }  # fmt: skip
     if "forecast" in document["wind"]:
         document["at"] = [f"{FORECAST_HOURS[1]}Z", f"{FORECAST_HOURS[-2]}Z"]
-        vehicle["end"] = "land"  # a flight without an end is beyond every forecast
-    return kind, document
+        for vehicle in vehicles:
+            vehicle["end"] = "land"  # a flight without an end is beyond every forecast
+    return document
 
 
 def _wind(rng: np.random.Generator, kind: str, most_m_s: float, folder: Path) -> dict[str, Any]:
@@ -214,5 +302,25 @@ def report(result: dict[str, Any]) -> str:
             f"{result['beyond']} flights beyond the declared winds: {beyond['inside']} inside all the same, "
             f"{beyond['named']} named as outside, {beyond['never']} named as never arriving"
         )
+    lines += [f"fault: {fault}" for fault in result["faults"][:20]]
+    return "\n".join(lines)
+
+
+def report_fleets(result: dict[str, Any]) -> str:
+    """The result of `run_fleets` in words."""
+    rows = result["kinds"].values()
+    flown, held, runs = (sum(row[key] for row in rows) for key in ("fleets", "held", "runs"))
+    kept = ", ".join(f"{what} in {sum(row[what] for row in rows)}" for what in ("order", "intervals", "separation"))
+    refused = ", ".join(f"{count} {why}" for why, count in result["refused"].items()) or "none"
+    lines = [
+        f"{flown} of {result['fleets']} fleets were flown, {held} kept everything; of {runs} runs: {kept}; refused: "
+        f"{refused}",
+        "winds                fleets  in still air alone  kept all  runs  order  intervals  separation",
+    ]
+    lines += [
+        f"{kind:<20}{row['fleets']:>7}{row['in_still_air']:>20}{row['held']:>10}{row['runs']:>6}{row['order']:>7}"
+        f"{row['intervals']:>11}{row['separation']:>12}"
+        for kind, row in result["kinds"].items()
+    ]
     lines += [f"fault: {fault}" for fault in result["faults"][:20]]
     return "\n".join(lines)

@@ -27,6 +27,22 @@ def test_missions_are_of_every_kind_and_the_same_for_a_seed(tmp_path: Path) -> N
     assert made[7] == wind.mission_of(1, 7, tmp_path)
 
 
+def test_fleets_are_in_sequence_in_every_kind_of_wind(tmp_path: Path) -> None:
+    made = [wind.fleet_of(1, number, tmp_path) for number in range(1, 40)]
+    assert {kind for kind, _ in made} == set(wind.WIND_KINDS)
+    assert {len(document["vehicles"]) for _, document in made} == set(range(2, 9))
+    assert made[6] == wind.fleet_of(1, 7, tmp_path)
+
+
+@pytest.mark.nightly
+def test_fleets_that_lose_their_intervals_are_counted_and_only_broken_words_are_faults() -> None:
+    result = wind.run_fleets(2, seed=1)
+    assert sum(row["fleets"] for row in result["kinds"].values()) + sum(result["refused"].values()) == 2
+    assert all(row["held"] + row["in_still_air"] >= row["fleets"] for row in result["kinds"].values())
+    assert result["faults"] == []
+    assert "kept everything" in wind.report_fleets(result)
+
+
 def test_a_number_out_of_range_is_refused() -> None:
     with pytest.raises(InputError, match="100000 flights"):
         wind.run(flights=0)

@@ -124,6 +124,9 @@ def bench_fleet(
 def bench_wind(
     flights: Annotated[int, typer.Option(metavar="N", help="Rehearsed flights in declared winds.")] = 1000,
     beyond: Annotated[int, typer.Option(metavar="N", help="Flights in winds beyond the declared ones.")] = 200,
+    fleets: Annotated[
+        int | None, typer.Option(metavar="N", help="Rehearsed fleets in place of flights: what order, intervals keep.")
+    ] = None,
     seed: Annotated[int, typer.Option(metavar="N", help="Seed of missions and winds.")] = 1,
     quick: QuickOption = False,
     as_json: JsonOption = False,
@@ -131,11 +134,17 @@ def bench_wind(
     """Plan and rehearse copters and wings in constant winds, ranges, profiles, forecasts, and winds that vary.
 
     Gusts blow in half of the missions. Count the arrivals inside the windows, and the flights that take more energy
-    than is planned. The exit code is 4 if there is one outside or above.
+    than is planned. The exit code is 4 if there is one outside or above. With --fleets, count the fleets of copters and
+    wings that keep order, intervals and separation in every run; 4 if a plan that does not say that its time table
+    holds in still air alone is lost.
     """
     from gcsplan.bench import wind as bench
     from gcsplan.cli.output.console import remark
 
+    if fleets is not None:
+        result = bench.run_fleets(min(fleets, 4) if quick else fleets, seed=seed, tell=remark)
+        _tell(result, bench.report_fleets, as_json)
+        raise typer.Exit(4 if result["faults"] else 0)
     result = bench.run(
         min(flights, 40) if quick else flights, min(beyond, 20) if quick else beyond, seed=seed, tell=remark
     )
