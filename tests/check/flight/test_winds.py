@@ -28,7 +28,9 @@ from gcsplan.fleet.motion.timing import legs
 from gcsplan.vehicle import Autopilot, Energy, Vehicle
 from gcsplan.wind.declared import DeclaredWind, FlightWind
 from gcsplan.wind.window import TimeWindow
+from gcsplan.world.geodesy.atmosphere import true_per_indicated
 from tests.check.test_judge import mission_over
+from tests.support.wings import through, wing
 from tests.support.worlds import vehicle, world
 
 THERE = [[0.0, 0, 366], [2500, -900, 366], [4000, 1500, 366]]
@@ -116,6 +118,24 @@ def test_a_vtol_keeps_an_airspeed_and_its_flight_in_winds_is_not_judged() -> Non
     assert (verdict.safe, verdict.arrive_window_s()) == (None, None)
     assert "vtol_in_wind" in {note.code for note in verdict.not_judged}
     assert flown(blows((0, 0), (0, 0)), vehicle(Autopilot.ARDUPLANE)).safe is True
+
+
+def test_a_wing_arrives_when_the_pilots_handbook_says() -> None:
+    """FAA-H-8083-25, Navigation, "Wind triangle": course 090°, wind of 40 kt from 045°, 120 kt through the air: 88 kt.
+
+    The handbook draws it, so its figures are right to half a knot; 2.2 of its miles take 90 s.
+    """
+    knot_m_s, mile_m, amsl_m = 1852.0 / 3600.0, 1852.0, 380.0
+    speed_m_s = 120.0 * knot_m_s / float(true_per_indicated(np.array([amsl_m]))[0])
+    craft = replace(wing(), speed_min_m_s=speed_m_s, speed_max_m_s=speed_m_s)
+    way = through([(800.0, 0.0, 80.0), (800.0 + 2.2 * mile_m, 0.0, 80.0)])
+    verdict = judge(way, craft, world(), wind=blows((40 * knot_m_s, 40 * knot_m_s), (45, 45)))
+    windows = verdict.leg_windows_s()
+    assert windows is not None
+    (_, begins_s), (earliest_s, latest_s) = windows[1:3]
+    assert verdict.legs[2].horizontal_m == pytest.approx(2.2 * mile_m, rel=1e-3)
+    assert earliest_s - begins_s == pytest.approx(90.0, rel=0.5 / 88.0)
+    assert latest_s == pytest.approx(earliest_s, abs=1e-6)
 
 
 def test_gusts_count_in_what_it_must_be_able_to_do_and_have_their_share() -> None:
