@@ -86,7 +86,7 @@ class _Writing:
             self._into_flow(node, [f"{key}: {flow(new[key])}" for key in added], own)
         else:
             column = node.value[0][0].start_mark.column
-            self._below(node, [line for key in added for line in _lines(key, new[key], " " * column)])
+            self._below(node, [line for key in added for line in _lines(key, new[key], " " * column)], column)
         return True
 
     def _value(self, name: yaml.Node, node: yaml.Node, old: Any, new: Any) -> bool:
@@ -119,7 +119,8 @@ class _Writing:
         if added and node.flow_style:
             self._into_flow(node, [flow(value) for value in added], node.value)
         elif added:
-            self._below(node, [f"{' ' * node.start_mark.column}- {flow(value)}" for value in added])
+            column = node.start_mark.column
+            self._below(node, [f"{' ' * column}- {flow(value)}" for value in added], column)
         return True
 
     def _entries(self, node: yaml.SequenceNode, old: list[Any], new: list[Any]) -> bool:
@@ -137,7 +138,7 @@ class _Writing:
         added = new[len(stays) :]
         if added:
             lines = [f"{' ' * node.start_mark.column}- {flow(value)}" for value in added]
-            self._below(node.value[max(stays)], lines)
+            self._below(node.value[max(stays)], lines, node.start_mark.column)
         return True
 
     def _into_flow(self, node: yaml.CollectionNode, parts: list[str], own: Any) -> None:
@@ -154,13 +155,17 @@ class _Writing:
         before = self.text[begin : name.start_mark.index].strip()
         return before == ("" if isinstance(member, tuple) else "-")
 
-    def _below(self, node: yaml.Node, lines: list[str]) -> None:
-        """In lines of their own behind the line in which a value ends."""
+    def _below(self, node: yaml.Node, lines: list[str], column: int) -> None:
+        """In lines of their own, which begin at a column, behind the line in which a value ends, and behind comments
+        below it that are farther in: they are the value's own."""
         end = _end(node)
         if self.text[end - 1 : end] == "\n":  # behind a block of text
             end -= 1
         stop = self.text.find("\n", end)
         stop = len(self.text) if stop < 0 else stop - self.text[:stop].endswith("\r")
+        own = re.compile(rf"\r?\n {{{column + 1},}}#[^\r\n]*")
+        while found := own.match(self.text, stop):
+            stop = found.end()
         self.spans.append((stop, stop, "".join(self.line_end + line for line in lines)))
 
 

@@ -49,6 +49,7 @@ vehicles:
         ("a:\n- {name: xx, b: 1, c: 2}  # x\n", {"a": [{"name": "xx", "d": 1}]}, "a:\n- {name: xx, d: 1}  # x\n"),
         ("a:\n- 1\n- 2  # two\n", {"a": [1, 3]}, "a:\n- 1\n- 3\n"),
         ("a:\n  b: 1\n  c: 2  # two\n  d: 3\n", {"a": {"b": 1, "d": 3}}, "a:\n  b: 1\n  d: 3\n"),
+        ("a:\n  - b: 1\n    # of b\n  # next\n", {"a": [{"b": 1}, 2]}, "a:\n  - b: 1\n    # of b\n  - 2\n  # next\n"),
         ("b: 1\na: |\n  text\n", {"b": 1, "a": "text\n", "c": 2}, "b: 1\na: |\n  text\nc: 2\n"),
     ],
 )
