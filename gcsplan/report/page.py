@@ -7,13 +7,11 @@ still has every number, the map and the profiles.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
 
 from gcsplan import __version__
-from gcsplan.figures import steepened
 from gcsplan.notes.note import Wording
 from gcsplan.notes.order import for_people
 from gcsplan.report.briefing import briefing_html
@@ -38,20 +36,18 @@ from gcsplan.report.parts.page_data import (
     only_some,
     samples_of,
 )
-from gcsplan.report.parts.track_samples import Passage, TrackLine, line_of, passages
+from gcsplan.report.parts.track_samples import Passage, TrackLine, passages
 from gcsplan.report.views import tables
 from gcsplan.report.views.fleet import fleet_html, motions_of
 from gcsplan.report.views.home import home_html, home_lines
 from gcsplan.report.views.plan import COLOURS, map_html, map_marks
 from gcsplan.report.views.profile import profile_html, profile_legend
-from gcsplan.report.views.replay import replay_data, replay_html, replay_of
-from gcsplan.report.views.scene_data import exaggeration, zone_meshes
-from gcsplan.report.views.shaded_terrain import Relief, extent_of, relief_of
+from gcsplan.report.views.replay import replay_html
+from gcsplan.report.views.space import drawn, space_data, space_html
 from gcsplan.report.views.tables import headline, rehearsal_html
 from gcsplan.units import KILOJOULE, Unit, Units, duration, in_units, span
 from gcsplan.world.geometry.zones import no_fly_of, on_map
 from gcsplan.world.terrain.model_words import what_is_not_in
-from gcsplan.world.world import World
 
 __all__ = ["render_page"]
 
@@ -65,48 +61,32 @@ FILTER = (
     '<label class="filter" hidden>Filter vehicles <input type="search" placeholder="a name, a verdict, a zone">'
     '<span class="note"></span></label>'
 )
-SCRIPTS = ("numbers.js", "base.js", "labels.js", "view.js", "flight.js", "replay.js", "charts.js", "mesh.js",
-           "scene.js", "filter.js", "start.js")  # fmt: skip
+SCRIPTS = ("paper.js", "numbers.js", "base.js", "labels.js", "view.js", "flight.js", "replay.js", "charts.js",
+           "mesh.js", "scene.js", "filter.js", "start.js")  # fmt: skip
 
 
 def render_page(page: Page) -> str:
     """A `Page` as HTML text."""
     full = in_full(page)
-    lines = [
-        line_of(s.verdict, page.world, s.vehicle.limits, samples=samples, slot=s.slot)
-        for s, samples in zip(page.subjects, samples_of(page, full), strict=True)
-    ]
-    drawn = [line for line in lines if line is not None]
-    zones, surface = page.world.airspace.zones, page.world.airspace.surface
-    no_fly = no_fly_of(zones)
-    crossed = (*no_fly, *(zone for zone in zones if zone not in on_map(zones)))
-    relief = relief_of(page.world, extent_of(drawn, no_fly, surface), page.units.height)
+    seen = drawn(page, samples_of(page, full))
+    lines, relief, replay = seen.lines, seen.relief, seen.replay
+    zones = page.world.airspace.zones
+    crossed = (*no_fly_of(zones), *(zone for zone in zones if zone not in on_map(zones)))
     found = [
         passages(line, crossed, _reach_m(subject)) if line is not None and i in full else []
         for i, (subject, line) in enumerate(zip(page.subjects, lines, strict=True))
     ]
     charts: dict[str, object] = {}
     fleet, home = fleet_html(page, charts, full), home_html(page, lines, charts, full)
-    replay = replay_of(page)
     flown = [t.places[:, 1:3] for t in replay.tracks if t.flown] if replay is not None else []
-    data = {
-        "grid": relief.grid,
-        "lines": [
-            _line_data(i, s, line) | {"broken": _broken(s, page.world)}
-            for i, (s, line) in enumerate(zip(page.subjects, lines, strict=True))
-            if line is not None
-        ],
-        "zones": zone_meshes(no_fly, surface, relief, drawn),
-        "exaggeration": exaggeration(relief, drawn),
-        "charts": charts, "units": page.units.as_dict(), "replay": replay_data(replay, page) if replay else None,
-    }  # fmt: skip
+    data = space_data(page, seen) | {"charts": charts, "units": page.units.as_dict()}
     marks = map_marks(page, lines, relief, full)
     body = "".join(
         (
             briefing_html(page, _verdict(page), relief, marks), _header(page), _vehicles(page),
             f'<section><h2>Map</h2>{tools("map")}{map_html(page, lines, relief, marks, flown)}'
             f"{replay_html(replay, page) if replay else ''}</section>",
-            tables.differences_html(page), rehearsal_html(page), _scene(page, relief),
+            tables.differences_html(page), rehearsal_html(page), space_html(page, relief),
             *_profiles(page, lines, found, full), home, fleet, *_details(page, lines, found, full), _end(page),
         )
     )  # fmt: skip
@@ -249,23 +229,6 @@ def _gap_words(bound: float | None, gap_percent: float | None, unit: Unit) -> st
     return f"no path is below {least(bound, 0, unit)}; gap {num(gap_percent, 2, '%')}"
 
 
-def _scene(page: Page, relief: Relief) -> str:
-    if not math.isfinite(relief.low_m):
-        return ""
-    return (
-        f'<section id="space"><h2>In space</h2>{tools("scene")}<figure class="view scene" id="scene"><canvas '
-        f'role="img" tabindex="0" aria-label="{esc(page.title)} in space: ground, no-fly zones and tracks; the map and '
-        'the profiles show the same"></canvas><canvas class="over" aria-hidden="true"></canvas>'
-        '<p class="nothing">This view needs a browser that runs scripts.</p></figure>'
-        '<label class="stretch" hidden>heights × <input type="range" min="1" max="8" step="0.5"> '
-        "<output></output></label>"
-        f'<p class="note">Drag to turn, two fingers or the right button to move. The ground is drawn every '
-        f"{num(relief.cell_m, 0 if relief.cell_m >= 10 else 1, page.units.distance)}: do not read clearances off this "
-        "view.</p>"
-        "</section>"
-    )
-
-
 def _profiles(
     page: Page, lines: Sequence[TrackLine | None], found: Sequence[list[Passage]], full: frozenset[int]
 ) -> list[str]:
@@ -333,39 +296,3 @@ def _notes(listed: str, count: int) -> str:
     if count <= MOST_NOTES:
         return f"<h3>Notes</h3><ul>{listed}</ul>"
     return f"<details><summary>{count} notes</summary><ul>{listed}</ul></details>"
-
-
-def _broken(subject: Subject, world: World) -> list[list[object]]:
-    """East, north, AMSL and kind of every finding that has a place."""
-    found: list[list[object]] = []
-    for f in subject.verdict.findings:
-        if math.isfinite(f.lat_deg + f.lon_deg + f.amsl_m):
-            e, n = (round(float(v), 1) for v in world.frame.to_plane(f.lat_deg, f.lon_deg))
-            found.append([e, n, round(f.amsl_m, 1), f.kind.replace("_", " ")])
-    return found
-
-
-def _line_data(index: int, subject: Subject, line: TrackLine) -> dict[str, object]:
-    """One line for the page's script, rounded to decimetres (a short one to millimetres), which is enough to view."""
-    legs = subject.verdict.legs
-
-    decimals = 1 if line.length_m > 1000.0 else 3
-
-    def rounded(values: object) -> list[float | None]:
-        return [round(float(v), decimals) if math.isfinite(v) else None for v in np.asarray(values, float)]
-
-    return {
-        "index": index, "name": subject.name,
-        "s": rounded(line.run_m), "e": rounded(line.east_m), "n": rounded(line.north_m),
-        "z": rounded(line.amsl_m), "g": rounded(line.ground_m),
-        "o": rounded(line.top_m) if not np.array_equal(line.top_m, line.ground_m, equal_nan=True) else None,
-        "f": rounded(line.floor_m), "c": rounded(line.ceiling_m), "t": rounded(line.time_s), "leg": line.leg.tolist(),
-        "j": [round(float(j) / 1000.0, 1) for j in line.used_j] if subject.verdict.energy_stated else None,
-        "legs": [
-            {"seq": leg.seq, "kind": leg.kind, "column": leg.column, "climb": steepened(leg.climb_deg, 1)}
-            for leg in legs
-        ],
-        "ends": np.flatnonzero(line.end).tolist(),
-        "battery": subject.vehicle.energy.battery_j and round(subject.vehicle.energy.battery_j / 1000.0, 1),
-        "volts": subject.vehicle.energy.battery_v,
-    }  # fmt: skip

@@ -1,23 +1,13 @@
 // What every figure shares: the numbers of the page, their wording, the tip beside the pointer, and who is pointed at.
-const data = JSON.parse(document.getElementById('data').textContent);
-// Paper is white, whatever the screen is, and what is folded is unfolded there; registered first, so that every figure is
-// drawn anew in its colours and its width.
-window.addEventListener('beforeprint', () => {
-  document.documentElement.classList.add('paper');
-  for (const part of document.querySelectorAll('details:not([open])')) { part.open = true; part.dataset.folded = ''; }
-});
-window.addEventListener('afterprint', () => {
-  document.documentElement.classList.remove('paper');
-  for (const part of document.querySelectorAll('details[data-folded]')) { part.open = false; delete part.dataset.folded; }
-});
+const data = globalThis.data || JSON.parse(document.getElementById('data').textContent); // the map to plan on has no block of data
 
 // The units of the page: by kind (path, leg, far, distance, height, amsl, speed, climb_rate) the symbol, the size in SI,
 // and the decimals more than in SI. All data are in SI; a unit of this table converts them where they are worded.
-const units = data.units;
+let units = data.units;
 
 // -- the ground -------------------------------------------------------------------------------------------------------
-const ground = (() => {
-  const g = data.grid, [west, south, east, north] = g.box;
+function groundOf(g) {
+  const [west, south, east, north] = g.box;
   const bytes = Uint8Array.from(atob(g.heights), (c) => c.charCodeAt(0));
   const z = new Float32Array(g.cols * g.rows);
   for (let i = 0; i < z.length; i++) {
@@ -36,7 +26,15 @@ const ground = (() => {
     at: (e, n) => mix(z, g.cols, g.rows, e, n),
     degrees: (e, n) => [mix(g.lat, g.lattice, g.lattice, e, n), mix(g.lon, g.lattice, g.lattice, e, n)],
   };
-})();
+}
+let ground = groundOf(data.grid);
+
+// Other numbers, of the same mission after an edit; whoever draws them is called after that.
+function takeNumbers(fresh) {
+  Object.assign(data, fresh);
+  units = data.units;
+  ground = groundOf(data.grid);
+}
 
 function placeWords(e, n) {
   const [lat, lon] = ground.degrees(e, n);

@@ -55,6 +55,7 @@ function mesh(gl, mode, columns, indices) {
   gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, order);
   gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, new Uint16Array(indices), gl.STATIC_DRAW);
   return {
+    free() { for (const made of [...buffers.map((b) => b[2]), order]) gl.deleteBuffer(made); },
     draw(p) {
       for (const name of ['p', 'q', 'corner']) if (p.attributes[name] >= 0) gl.disableVertexAttribArray(p.attributes[name]);
       for (const [name, width, buffer] of buffers) {
@@ -91,7 +92,25 @@ function build(gl, at, low) {
     skirt.push(p[3 * k], p[3 * k + 1], p[3 * k + 2], p[3 * k], p[3 * k + 1], deep);
     if (i) skirtFaces.push(2 * i - 2, 2 * i - 1, 2 * i, 2 * i, 2 * i - 1, 2 * i + 1);
   });
-  const tracks = data.lines.map((line) => {
+  const zones = data.zones.map(zoneMesh);
+  return { ground: mesh(gl, gl.TRIANGLES, { p: [3, p] }, faces), skirt: mesh(gl, gl.TRIANGLES, { p: [3, skirt] }, skirtFaces), tracks: buildTracks(gl, at, low), zones };
+
+  function zoneMesh(zone) {
+    const q = [], n = zone.at.length / 3;
+    const middle = [0, 0, -1e9];
+    for (let i = 0; i < n; i++) {
+      const s = [zone.at[3 * i], zone.at[3 * i + 1], zone.at[3 * i + 2] - low];
+      q.push(...s);
+      middle[0] += s[0] / n;
+      middle[1] += s[1] / n;
+      middle[2] = Math.max(middle[2], s[2]);
+    }
+    return { name: zone.name, top: middle, faces: mesh(gl, gl.TRIANGLES, { p: [3, q] }, zone.faces), edges: mesh(gl, gl.LINES, { p: [3, q] }, zone.edges) };
+  }
+}
+
+function buildTracks(gl, at, low) {
+  return data.lines.map((line) => {
     const q = line.s.map((_, i) => at(line.e[i], line.n[i], line.z[i]));
     const columns = { p: [3, []], q: [3, []], corner: [2, []] }, order = [], sheet = [], sheetFaces = [];
     for (let i = 0; i + 1 < q.length; i++) {
@@ -109,19 +128,6 @@ function build(gl, at, low) {
     });
     return { line: mesh(gl, gl.TRIANGLES, columns, order), curtain: mesh(gl, gl.TRIANGLES, { p: [3, sheet] }, sheetFaces) };
   });
-  const zones = data.zones.map((zone) => {
-    const q = [], n = zone.at.length / 3;
-    const middle = [0, 0, -1e9];
-    for (let i = 0; i < n; i++) {
-      const s = [zone.at[3 * i], zone.at[3 * i + 1], zone.at[3 * i + 2] - low];
-      q.push(...s);
-      middle[0] += s[0] / n;
-      middle[1] += s[1] / n;
-      middle[2] = Math.max(middle[2], s[2]);
-    }
-    return { name: zone.name, top: middle, faces: mesh(gl, gl.TRIANGLES, { p: [3, q] }, zone.faces), edges: mesh(gl, gl.LINES, { p: [3, q] }, zone.edges) };
-  });
-  return { ground: mesh(gl, gl.TRIANGLES, { p: [3, p] }, faces), skirt: mesh(gl, gl.TRIANGLES, { p: [3, skirt] }, skirtFaces), tracks, zones };
 }
 
 // -- a little algebra; matrices are columns, as WebGL wants them ---------------------------------------------------------

@@ -1,5 +1,6 @@
 // The replay: a time, moved by the slider or by the clock, and every figure that shows the vehicles at that time.
-const replay = { t: 0, tracks: data.replay ? data.replay.tracks.map(trackOf) : [], places: [], shown: false };
+const tracksNow = () => (data.replay ? data.replay.tracks.map(trackOf) : []);
+const replay = { t: 0, tracks: tracksNow(), places: [], shown: false };
 // What shows the vehicles; each is called after the time has changed.
 const movers = [];
 
@@ -12,15 +13,19 @@ function moveTo(t, shown = true) {
 
 function startReplay() {
   const box = document.getElementById('replay');
-  if (!box) return;
+  if (!box) return null;
   const slider = box.querySelector('input'), output = box.querySelector('output'), speed = box.querySelector('select');
   const play = box.querySelector('[data-do="play"]'), closest = box.querySelector('[data-do="closest"]');
-  const rows = [...box.querySelectorAll('tbody tr')].map((row) => [...row.querySelectorAll('td')]);
-  const several = new Set(replay.tracks.map((track) => track.k)).size > 1;
+  let rows = [], several = false;
   let last = null; // the clock's last tick; null while it stands still
   box.hidden = false;
-  slider.max = data.replay.end;
 
+  // Reads what is there to be moved.
+  function take() {
+    rows = [...box.querySelectorAll('tbody tr')].map((row) => [...row.querySelectorAll('td')]);
+    several = new Set(replay.tracks.map((track) => track.k)).size > 1;
+    slider.max = data.replay.end;
+  }
   function show() {
     const words = clockWords(replay.t);
     slider.value = replay.t;
@@ -65,7 +70,9 @@ function startReplay() {
   box.querySelector('details').addEventListener('toggle', fill);
   window.addEventListener('beforeprint', () => run(false));
   movers.push(show);
+  take();
   moveTo(0, false);
+  return take;
 }
 
 // The vehicles that the filter hides, by number.

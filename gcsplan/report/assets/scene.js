@@ -1,22 +1,20 @@
 // The view in space: its camera, its gestures of mouse and fingers, and its labels.
 const MOST_LABELS = 300; // more would not be read, and each takes time in every frame
 
-function startScene() {
+// `picture` is the address of the shaded ground. The answer redraws what has changed: the lines alone, or all.
+function startScene(picture = () => document.querySelector('#map image').getAttribute('href')) {
   const figure = document.getElementById('scene');
-  if (!figure) return;
+  if (!figure) return null;
   const [canvas, over] = figure.querySelectorAll('canvas'), nothing = figure.querySelector('.nothing');
   const gl = canvas.getContext('webgl', { antialias: true, preserveDrawingBuffer: true, alpha: false });
-  if (!gl) { nothing.textContent = 'This browser offers no WebGL: the map and the profiles show the same.'; return; }
+  if (!gl) { nothing.textContent = 'This browser offers no WebGL: the map and the profiles show the same.'; return null; }
   nothing.remove();
   const pen = over.getContext('2d'), programs = {};
   for (const name of Object.keys(SHADERS)) programs[name] = program(gl, ...SHADERS[name]);
-  const low = Math.min(...[...ground.z].filter((z) => !isNaN(z)));
+  let low, highest, block, meshes;
   const at = (e, n, z) => [e - ground.west, n - ground.south, z - low];
-  const meshes = build(gl, at, low);
   const camera = { turn: -0.5, tilt: 0.75, far: 1.25 * Math.max(ground.width, ground.height), x: 0.5 * ground.width, y: 0.5 * ground.height };
-  const spans = data.lines.flatMap((l) => l.z.map((z) => z - low));
   let stretch = data.exaggeration, pointed = null, scheduled = false, printing = false, matrix = null, size = [1, 1];
-  const highest = Math.max(0, ...[...ground.z].map((z) => (isNaN(z) ? 0 : z - low)), ...spans);
   const lift = () => 0.4 * stretch * highest;
   const home = { ...camera };
 
@@ -50,7 +48,30 @@ function startScene() {
       [gl.TEXTURE_MIN_FILTER, gl.LINEAR], [gl.TEXTURE_MAG_FILTER, gl.LINEAR]]) gl.texParameteri(gl.TEXTURE_2D, key, value);
     redraw();
   };
-  image.src = document.querySelector('#map image').getAttribute('href');
+
+  // What the numbers say now; the camera keeps its place over the middle of the ground.
+  function take() {
+    const known = [...ground.z].filter((z) => !isNaN(z));
+    low = Math.min(...known);
+    highest = Math.max(0, ...[...known, ...data.lines.flatMap((l) => l.z)].map((z) => z - low));
+    for (const old of meshes ? [meshes.ground, meshes.skirt, ...meshes.zones.flatMap((z) => [z.faces, z.edges])] : []) old.free();
+    freeTracks();
+    meshes = build(gl, at, low);
+    for (const view of block ? [camera, home] : []) {
+      view.x += 0.5 * (ground.width - block.width);
+      view.y += 0.5 * (ground.height - block.height);
+    }
+    block = { width: ground.width, height: ground.height };
+    image.src = picture();
+  }
+  function freeTracks() {
+    for (const t of meshes ? meshes.tracks : []) { t.line.free(); t.curtain.free(); }
+  }
+  function takeLines() {
+    freeTracks();
+    meshes.tracks = buildTracks(gl, at, low);
+    redraw();
+  }
 
   function redraw() {
     if (scheduled) return;
@@ -124,14 +145,14 @@ function startScene() {
       gl.uniform2f(p.width, 7, 0.0006);
       paint(t.line, colour('--casing', 1));
       gl.uniform2f(p.width, 4, 0.0009);
-      paint(t.line, colour(`--t${data.lines[k].index % 8}`, 1));
+      paint(t.line, colour(hue(data.lines[k]), 1));
     });
     p = use('plain');
     gl.enable(gl.BLEND);
     for (const z of meshes.zones) paint(z.edges, colour('--zone-line', 0.9));
     gl.depthMask(false);
     for (const z of meshes.zones) paint(z.faces, colour('--zone', 0.26));
-    meshes.tracks.forEach((t, k) => paint(t.curtain, colour(`--t${data.lines[k].index % 8}`, 0.22)));
+    meshes.tracks.forEach((t, k) => paint(t.curtain, colour(hue(data.lines[k]), 0.22)));
     gl.depthMask(true);
     gl.disable(gl.BLEND);
     labels(ratio, style);
@@ -161,7 +182,7 @@ function startScene() {
     };
     for (const z of meshes.zones) { const c = project(z.top); if (c && !hidden(z.top)) write(z.name, c, 0, true, style.getPropertyValue('--zone-text')); }
     data.lines.forEach((line, k) => {
-      const colour = style.getPropertyValue(`--t${line.index % 8}`), last = line.s.length - 1;
+      const colour = style.getPropertyValue(hue(line)), last = line.s.length - 1;
       for (const [i, words] of [[0, 'start'], [last, 'goal']]) {
         const p = at(line.e[i], line.n[i], line.z[i]), c = project(p);
         if (!c || hidden(p)) continue;
@@ -307,10 +328,15 @@ function startScene() {
   range.value = stretch;
   range.addEventListener('input', () => { stretch = +range.value; show(); redraw(); });
   show();
+  take();
   fit();
   new ResizeObserver(redraw).observe(figure);
   movers.push(redraw);
   watchers.push((k, i) => { pointed = k < 0 ? null : [k, i]; redraw(); });
   matchMedia('(prefers-color-scheme: dark)').addEventListener('change', redraw);
   for (const when of ['beforeprint', 'afterprint']) window.addEventListener(when, () => { printing = when === 'beforeprint'; draw(); });
+  return { takeLines, takeAll: () => { take(); pointed = null; redraw(); } };
 }
+
+// The colour of a line; one that is not judged yet has none of its own.
+const hue = (line) => (line.draft ? '--quiet' : `--t${line.index % 8}`);

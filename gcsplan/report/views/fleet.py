@@ -10,11 +10,13 @@ import numpy as np
 
 from gcsplan.arrays import Floats
 from gcsplan.fleet.motion.timing import TimedPath
+from gcsplan.fleet.separation import Separation
+from gcsplan.notes.note import Note
 from gcsplan.report.parts.html import Mark, esc, least, num, stated, table, tools
 from gcsplan.report.parts.page_data import Page, only_some
 from gcsplan.report.views.chart import Axes, chart_html
 from gcsplan.report.views.plan import COLOURS
-from gcsplan.units import duration
+from gcsplan.units import Units, duration
 
 INSTANTS = 600
 MOST_PAIRS = 6
@@ -148,11 +150,16 @@ def _schedule(page: Page, motions: Sequence[tuple[int, TimedPath]]) -> str:
 
 
 def separation_words(page: Page) -> str:
-    """The fleet's exact least distance in a sentence of HTML; empty if none was judged."""
-    found = page.separation
+    """`separation_text` as HTML."""
+    text = esc(separation_text(page.separation, page.notes, page.units))
+    return text.replace("Separation broken", "Separation <b>broken</b>", 1)
+
+
+def separation_text(found: Separation | None, notes: Sequence[Note], units: Units) -> str:
+    """The fleet's exact least distance in a sentence; empty if none was judged."""
     if found is None:
         return ""
-    unit = page.units.distance
+    unit = units.distance
     needed = (
         f"{stated(found.rules.separation_m, unit)} required, {stated(found.rules.needed_m, unit)} needed in the model"
     )
@@ -160,9 +167,9 @@ def separation_words(page: Page) -> str:
         return f"No two vehicles are ever in the air at the same time ({needed})."
     a, b = found.least.vehicles
     near = f"{least(found.least.distance_m, 1, unit)} at {duration(found.least.time_s, 1)}"
-    word = "kept" if found.safe else "<b>broken</b>"
-    still = " in still air" if any(note.code == "schedule_in_still_air" for note in page.notes) else ""
-    return f"Separation {word}{still}: {esc(a)} and {esc(b)} come nearest, {near} ({needed}; exact, not sampled)."
+    word = "kept" if found.safe else "broken"
+    still = " in still air" if any(note.code == "schedule_in_still_air" for note in notes) else ""
+    return f"Separation {word}{still}: {a} and {b} come nearest, {near} ({needed}; exact, not sampled)."
 
 
 def _distance_chart(
