@@ -22,8 +22,9 @@ from typing import Any
 import numpy as np
 
 from gcsplan.app.fleet import pipeline
+from gcsplan.app.fleet.kept_paths import KeptPaths
 from gcsplan.app.plan.arguments import require
-from gcsplan.app.plan.model import Plan
+from gcsplan.app.plan.model import Plan, PlanOptions, VehiclePlan
 from gcsplan.arrays import Floats
 from gcsplan.errors import (
     InputError,
@@ -42,6 +43,7 @@ from gcsplan.mission_file.request import Content, MissionFile
 from gcsplan.mission_file.source import read_content
 from gcsplan.planners.problem import Problem, Progress, Solution
 from gcsplan.plugins import failing
+from gcsplan.world.world import World
 
 __all__ = ["BetterPath", "Planner"]
 
@@ -118,9 +120,8 @@ class Planner:
         at: str | Sequence[str] | None = None,
     ) -> None:
         require("Planner", planner=planner, objective=objective, seed=seed, options=options)
-        self._options: dict[str, Any] = {
-            "planner": planner, "objective": objective, "seed": seed, "options": options,
-        }  # fmt: skip
+        keys = dict(elements("Planner()", "options", (options or {}).items(), tuple, "a mapping of a planner's keys"))
+        self._options = PlanOptions(planner, objective, seed, keys)
         source = mission if isinstance(mission, MissionFile) else load_mission(mission, at=at)
         if source.content is None:
             raise UsageError(
@@ -128,7 +129,7 @@ class Planner:
             )
         # Lines of a text would be those before its changes.
         self._content: Content = replace(source.content, text=None)
-        self._kept = KeptWorld()
+        self._kept, self._paths = KeptWorld(), KeptPaths()
         self._planning, self._state = threading.RLock(), threading.Lock()
         self._cancels = 0
 
@@ -168,15 +169,19 @@ class Planner:
         on_path: PathCall | None = None,
         on_bound: BoundCall | None = None,
         leave_out: bool | None = None,
+        alone: str | None = None,
     ) -> Plan:
         """Plan the mission as it is now; ``changes`` count for this plan alone.
 
         ``on_path(better)`` is called for each path that is better than those before, ``on_bound(vehicle, bound)`` for
         each higher lower bound, both in this thread while the search goes on; what they raise ends the plan.
 
+        ``alone`` names a vehicle that is planned without the others: its path, and no time table. This is quick while
+        only that vehicle changes, and no plan of the mission.
+
         Returns what `gcsplan.plan` returns. Raises InputError, NoMission, and Cancelled after `cancel`.
         """
-        return self._planned(self._cancels, changes, on_path, on_bound, leave_out)
+        return self._planned(self._cancels, changes, on_path, on_bound, leave_out, alone)
 
     def _planned(
         self,
@@ -185,6 +190,7 @@ class Planner:
         on_path: PathCall | None,
         on_bound: BoundCall | None,
         leave_out: bool | None,
+        alone: str | None = None,
     ) -> Plan:
         """See `plan`; a cancel after the first ``cancels`` ends it."""
         require("plan", on_path=on_path, on_bound=on_bound, leave_out=leave_out)
@@ -193,8 +199,12 @@ class Planner:
         with cancelled_by(lambda: self._cancels != cancels), self._planning:
             heed_cancel()
             source = load_content(content, self._kept)
+            if alone is not None:
+                source = _alone(source, alone)
             heard = _Listening(source, on_path, on_bound, begun_s) if on_path or on_bound else None
-            return pipeline.plan(source, progress=heard, leave_out=leave_out, **self._options)
+            lasting = changes is None and alone is None  # what counts for this plan alone leaves no trace
+            kept = self._paths if lasting else KeptPaths()
+            return pipeline.plan_again(source, replace(self._options, leave_out=leave_out), kept, heard)
 
     async def plan_async(
         self,
@@ -226,7 +236,7 @@ class Planner:
     def reload(self) -> None:
         """Forget what is kept of files, so that the next plan reads them as they are then."""
         with self._planning:
-            self._kept = KeptWorld()
+            self._kept, self._paths = KeptWorld(), KeptPaths()
 
 
 class _Listening:
@@ -253,6 +263,22 @@ class _Listening:
             elapsed_s = time.perf_counter() - self._begun_s
             self._on_path(BetterPath(vehicle, lat, lon, points[:, 2].copy(), cost, state.lower_bound, elapsed_s))
         self._known[vehicle] = cost, bound, state.elapsed_s
+
+
+def path_of(v: VehiclePlan, world: World, elapsed_s: float) -> BetterPath:
+    """The last path of a vehicle's search."""
+    points = v.solution.path.points
+    lat, lon = world.frame.to_degrees(points[:, 0], points[:, 1]).T
+    return BetterPath(v.name, lat, lon, points[:, 2].copy(), v.cost, v.solution.lower_bound, elapsed_s)
+
+
+def _alone(source: MissionFile, name: str) -> MissionFile:
+    """The mission of one of its vehicles. Raises InputError."""
+    found = tuple(request for request in source.vehicles if request.vehicle.name == name)
+    if not found:
+        names = [request.vehicle.name for request in source.vehicles]
+        raise unknown_name(f"alone names a vehicle of the mission, given {name[:64]!r}", name, names)
+    return replace(source, vehicles=found, arrival=None)
 
 
 def _changed(content: Content, changes: Mapping[str, object]) -> Content:

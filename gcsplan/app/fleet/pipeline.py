@@ -13,6 +13,7 @@ from os import PathLike
 from typing import Any
 
 from gcsplan.app.fleet.fleet import finished
+from gcsplan.app.fleet.kept_paths import KeptPaths
 from gcsplan.app.fleet.start_time import GateTime
 from gcsplan.app.fleet.vehicle_plans import PIECE_S, plan_or_explain, planned_by
 from gcsplan.app.parallel.executor import Inline, executor
@@ -27,7 +28,7 @@ from gcsplan.planners.registry import VOLUME_KEYS, AddedEntry
 from gcsplan.planners.registry import get as get_planner
 from gcsplan.planners.registry import own as own_planner
 
-__all__ = ["load_mission", "plan", "world_of"]
+__all__ = ["load_mission", "plan", "plan_again", "world_of"]
 
 
 def plan(  # noqa: PLR0913 - options by name, each with a default
@@ -95,11 +96,30 @@ def plan(  # noqa: PLR0913 - options by name, each with a default
         raise InputError(f"{words}load_mission", where="gate_utc")
     keys = dict(elements("plan()", "options", (options or {}).items(), tuple, "a mapping of a planner's keys"))
     brief = _brief_of(source, PlanOptions(planner, objective, seed, keys))
-    if leave_out is None:
-        leave_out = source.arrival is not None and source.arrival.leave_out
-    leaving = LeavingOut(allowed=leave_out)
+    leaving = _leaving(source, leave_out)
     vehicles = _planned(brief, progress, jobs, cluster, leaving)
     return finished(brief, vehicles, progress, leaving, None if gate_utc is None else GateTime(gate_utc))
+
+
+def plan_again(
+    source: MissionFile,
+    given: PlanOptions,
+    kept: KeptPaths,
+    progress: Callable[[str, Progress], None] | None = None,
+) -> Plan:
+    """`plan` for a session, which searches no path anew where only the arrival differs from what is ``kept``."""
+    brief, leaving = _brief_of(source, given), _leaving(source, given.leave_out)
+    vehicles = kept.get(brief, leaving)
+    if vehicles is None:
+        vehicles = _planned(brief, progress, 1, None, leaving)
+        kept.put(brief, vehicles, leaving)
+    return finished(brief, vehicles, progress, leaving)
+
+
+def _leaving(source: MissionFile, leave_out: bool | None) -> LeavingOut:
+    if leave_out is None:
+        leave_out = source.arrival is not None and source.arrival.leave_out
+    return LeavingOut(allowed=leave_out)
 
 
 def _brief_of(source: MissionFile, given: PlanOptions) -> Brief:

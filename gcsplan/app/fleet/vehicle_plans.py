@@ -28,7 +28,7 @@ from gcsplan.planners.problem import Problem, Progress, Refusal, Solution
 from gcsplan.planners.refusal.suggestions import with_cures
 from gcsplan.world.world import World
 
-__all__ = ["PIECE_S", "plan_or_explain", "planned_by"]
+__all__ = ["PIECE_S", "Answer", "plan_or_explain", "planned_by", "restored"]
 
 PIECE_S = 0.6
 """Seconds that planning a vehicle takes, about: the median of 60 over mountains with margins."""
@@ -122,7 +122,7 @@ def planned_by(
     for number, why in sorted(refused.items()):
         if isinstance(why, NoMission):
             leaving.leave(names[number], why)
-    return [_restored(brief, *answers[k]) for k in sorted(answers)]
+    return [restored(brief, *answers[k]) for k in sorted(answers)]
 
 
 def answer_of(site_and_brief: SiteAndBrief, name: str) -> Answer | GcsplanError:
@@ -138,6 +138,7 @@ def answer_of(site_and_brief: SiteAndBrief, name: str) -> Answer | GcsplanError:
     return plan.packed(), plan.brief.source.level
 
 
-def _restored(brief: Brief, plan: VehiclePlan, level: int) -> VehiclePlan:
+def restored(brief: Brief, plan: VehiclePlan, level: int) -> VehiclePlan:
+    """A packed plan over the mission's terrain of the level that it was made over. Raises InputError."""
     source = widened(brief.source, level)
     return plan.restored(brief if source is brief.source else brief.over(source, world_of(source)))
