@@ -18,6 +18,8 @@ from gcsplan.check.returns.words import verdict_words
 from gcsplan.check.verdict import LegFigures, Verdict
 from gcsplan.errors import GcsplanError, InputError, NoMission
 from gcsplan.notes.note import Wording
+from gcsplan.page.fleet.crew_changes import attempts
+from gcsplan.page.fleet.time_table import numbers_of, time_table
 from gcsplan.page.form import cure_changes
 from gcsplan.page.history import EditedDocument
 from gcsplan.planners.problem import gap_percent
@@ -54,11 +56,12 @@ def plan_answer(n: int, plan: Plan, homes: Mapping[str, WayHome], units: Units, 
     wording = Wording(units)
     verdicts = [_flies(v, plan, homes.get(v.name)) for v in plan.vehicles]
     safe = False if False in verdicts else None if None in verdicts or plan.left_out else True
-    notes = [note.text(wording) for note in dict.fromkeys(plan.notes)]
+    notes, numbers = [note.text(wording) for note in dict.fromkeys(plan.notes)], numbers_of(plan)
     return {
         "type": "plan", "n": n, "verdict": _word(safe), "headline": _headline(plan, homes, wording),
         "elapsed_ms": round(elapsed_s * 1e3, 1),
-        "vehicles": [_vehicle(k, v, plan, homes.get(v.name), units) for k, v in enumerate(plan.vehicles)],
+        "vehicles": [_vehicle(numbers[v.name], v, plan, homes.get(v.name), units) for v in plan.vehicles],
+        "fleet": time_table(plan, units),
         "left_out": [{"name": left.name, "message": left.message} for left in plan.left_out],
         "notes": notes[:MOST_ON_PAGE],
     }  # fmt: skip
@@ -100,14 +103,14 @@ def _vehicle(number: int, v: VehiclePlan, plan: Plan, home: WayHome | None, unit
 
 def home_answer(n: int, plan: Plan, homes: Mapping[str, WayHome], units: Units) -> dict[str, Any]:
     """The way home of each vehicle, which takes longer than its plan."""
-    wording, vehicles = Wording(units), []
-    for number, v in enumerate(plan.vehicles):
+    wording, vehicles, numbers = Wording(units), [], numbers_of(plan)
+    for v in plan.vehicles:
         line = line_of(v.verdict, plan.world, v.request.vehicle.limits, samples=PROFILE_SAMPLES)
         home = homes.get(v.name)
         if home is None or line is None:
             continue
         vehicles.append({
-            "vehicle": number, "figure": _home_figure(home, wording),
+            "vehicle": numbers[v.name], "figure": _home_figure(home, wording),
             "way_home": _way_home(home, line, plan.world.frame, wording),
         })  # fmt: skip
     return {"type": "home", "n": n, "headline": _headline(plan, homes, wording), "vehicles": vehicles}
@@ -122,6 +125,7 @@ def refused_answer(n: int, why: NoMission, document: EditedDocument, units: Unit
     return {
         "type": "refused", "n": n, "live": live, "reason": why.reason, "message": in_units(str(why), units),
         "at": None if why.at is None else list(why.at), "vehicle": why.vehicle or None, "cures": cures,
+        "attempts": attempts(document, why),
     }  # fmt: skip
 
 

@@ -21,6 +21,7 @@ from gcsplan.errors import GcsplanError, InputError
 from gcsplan.mission_file import load_mission
 from gcsplan.mission_file.new_file import Draft, place_text, text_of
 from gcsplan.mission_file.source import is_sample
+from gcsplan.page.fleet.crew_changes import with_crew
 from gcsplan.page.form import require_changes
 from gcsplan.page.history import EditedDocument, EditHistory
 from gcsplan.page.places import place_of, with_heights
@@ -137,7 +138,7 @@ class Edits:
         self._live.clear()
         before = self.planner.mission
         try:
-            self.planner.change(changes)
+            self.planner.change(with_crew(before, changes))
         except InputError as why:
             raise PageError(why.message, code="bad_change", where=next(iter(changes))) from why
         if self.planner.mission != before:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args
 
 from gcsplan.errors import LimitValues, Mistake
@@ -13,6 +13,7 @@ from gcsplan.mission_file.json_schema import LATE_DEFAULTS, describe
 from gcsplan.mission_file.values.keys import Keys
 from gcsplan.mission_file.values.schema import LimitKeys, PlannerKeys, TerrainKeys, VehicleKeys
 from gcsplan.mission_file.values.units import UNIT_SYMBOLS, Written, other_names, unit_end
+from gcsplan.page.fleet.crew_changes import is_crew_key
 from gcsplan.page.history import EditedDocument
 from gcsplan.page.refused import PageError
 from gcsplan.units import Kind
@@ -80,7 +81,8 @@ def require_changes(changes: object) -> Mapping[str, object]:
     for place, value in changes.items():
         zone = _ZONE.fullmatch(place)
         inner = set(value) if zone and zone[1] is None and isinstance(value, dict) else {zone[1]} if zone else set()
-        good = inner - {None} <= ZONE_KEYS if zone else _PLACES.fullmatch(place) or _is_of_form(place)
+        named = _PLACES.fullmatch(place) or is_crew_key(place, value) or _is_of_form(place)
+        good = inner - {None} <= ZONE_KEYS if zone else named
         if not good:
             raise PageError("this key cannot be changed on the page", code="bad_change", where=place[:80])
     return changes
@@ -97,9 +99,10 @@ def _is_of_form(place: str) -> bool:
     return bool(section) and (name in known or name in other_names(known))
 
 
-def form_of(document: EditedDocument, problems: Sequence[Mistake]) -> list[dict[str, Any]]:
-    """The form's fields with their values; the mistakes of a key stand at its field."""
-    return [_field(key, document, problems) for key in FORM]
+def form_of(document: EditedDocument, problems: Sequence[Mistake], vehicle: int = 0) -> list[dict[str, Any]]:
+    """The form's fields with their values, with one ``vehicle``'s; the mistakes of a key stand at its field."""
+    own = f"vehicles[{vehicle}]"
+    return [_field(replace(k, section=own) if k.group == "vehicle" else k, document, problems) for k in FORM]
 
 
 def _field(form: FormKey, document: EditedDocument, problems: Sequence[Mistake]) -> dict[str, Any]:
@@ -130,9 +133,9 @@ def _is_at(where: str, place: str) -> bool:
 
 def _section(document: EditedDocument, place: str) -> dict[str, Any]:
     """The section of a place, empty where the document has none."""
-    if place == FIRST_VEHICLE:
-        vehicles = document.get("vehicles")
-        found: Any = vehicles[0] if isinstance(vehicles, list) and vehicles else None
+    if place.startswith("vehicles["):
+        vehicles, number = document.get("vehicles"), int(place[len("vehicles[") : -1])
+        found: Any = vehicles[number] if isinstance(vehicles, list) and number < len(vehicles) else None
     else:
         found = document.get(place)
     return found if isinstance(found, dict) else {}

@@ -7,6 +7,7 @@ left out. Any other message ends the plan that it supersedes.
 from __future__ import annotations
 
 import queue
+import re
 import threading
 import time
 from collections.abc import Callable, Mapping
@@ -16,14 +17,16 @@ from typing import Any
 
 from gcsplan.app.plan.model import Plan
 from gcsplan.app.plan.way_home import home_of, homes_of, is_required
-from gcsplan.app.session import BetterPath
+from gcsplan.app.session import BetterPath, path_of
 from gcsplan.check.returns.verdict import WayHome
 from gcsplan.errors import Cancelled, GcsplanError, InputError, Mistake, NoMission, cancelled_by
 from gcsplan.mission_file.kept import KeptWorld
-from gcsplan.mission_file.load import zones_by_entry
+from gcsplan.mission_file.load import MOST_VEHICLES_OF_FILE, zones_by_entry
 from gcsplan.mission_file.request import Content
 from gcsplan.page import answers
 from gcsplan.page.edits import Edits, terrain_choices
+from gcsplan.page.fleet.crew_changes import arrival_of
+from gcsplan.page.fleet.scene import scene_answer
 from gcsplan.page.form import form_of
 from gcsplan.page.ground_tiles import LEAST_ZOOM, MOST_ZOOM, GroundTiles, contour_interval_m
 from gcsplan.page.history import EditedDocument
@@ -45,6 +48,8 @@ IDLE_S = 1.0
 
 MOST_MESSAGES_WAITING = 1000
 """Most messages that wait; live ones of one drag are joined."""
+
+_PLACE_OF = re.compile(r"vehicles\[(\d+)\]\.(?:start|goal|via)$")
 
 SPARE_DEG = 0.01
 """Degrees around a mission where the map opens."""
@@ -71,6 +76,9 @@ class MapSession:
         self._problems: tuple[Mistake, ...] = ()
         self._zones = KeptWorld()
         self._names: list[str] = []
+        self._vehicle = 0
+        self._last: Plan | None = None
+        self._shows_scene = False
         self._revision = 0
         self._tiles: GroundTiles | None = None
         self._tiles_of: Any = None
@@ -207,8 +215,17 @@ class MapSession:
                 getattr(edits, kind)()
             self._disk = edits.store.disk()
             self._unkept = True
+        elif kind == "vehicle":
+            self._vehicle = _number(message.get("vehicle"))
+            self._send_state()
+            return False
+        elif kind == "scene":
+            self._shows_scene = message.get("on") is True
+            self._send_scene()
+            return False
         elif kind == "hello":
             edits.cancel()  # a page that comes again has dropped what it dragged
+            self._shows_scene = False
         else:
             raise PageError("this type of message is not known", code="bad_message", where="type")
         self._problems = ()
@@ -236,10 +253,13 @@ class MapSession:
         edits, planner, n = self._edits, self._edits.planner, self._n
         assert planner is not None
         self._costs.clear()
+        if not live:
+            self._last = None
         self._begun_s = time.monotonic()
         begun_s = time.perf_counter()
         seen: set[str] = set()
-        names = self._names
+        names, alone = self._names, self._moved_alone() if live else None
+        paths = len(names) if alone is None else 1
 
         def on_path(found: BetterPath) -> None:
             if live and found.vehicle in seen:
@@ -248,7 +268,7 @@ class MapSession:
             seen.add(found.vehicle)
             self._costs[found.vehicle] = found.cost
             self._send(answers.path_answer(n, names.index(found.vehicle), found, live=live, first=first))
-            if live and len(seen) == len(names):
+            if live and len(seen) == paths:
                 raise _Enough
 
         def on_bound(vehicle: str, bound: float) -> None:
@@ -260,8 +280,14 @@ class MapSession:
         try:
             if self._held is not None or (self._superseded and not live):
                 return  # a message waits behind the drag, or what is owed comes after it
-            plan = planner.plan(dict(edits.live) if live else None, on_path=on_path, on_bound=on_bound)
+            changes = dict(edits.live) if live else None
+            plan = planner.plan(changes, on_path=on_path, on_bound=on_bound, alone=alone)
             self._planning_live = None
+            if live:
+                for v in plan.vehicles:  # of a planner that tells no progress
+                    on_path(path_of(v, plan.world, time.perf_counter() - begun_s))
+                return
+            self._last = plan
             self._send_plan(n, plan, time.perf_counter() - begun_s)
             self._owed = False
         except _Enough:
@@ -288,6 +314,7 @@ class MapSession:
         required = is_required(plan.source, option=False)
         homes = homes_of(plan) if required else {}
         self._send(answers.plan_answer(n, plan, homes, self._units, elapsed_s))
+        self._send_scene()
         if required:
             return
         with suppress(Cancelled), cancelled_by(lambda: self._superseded):
@@ -295,6 +322,17 @@ class MapSession:
                 v.name: home_of(v.verdict, v.request, plan.world, plan.source.terrain_error_m) for v in plan.vehicles
             }
             self._send(answers.home_answer(n, plan, found, self._units))
+
+    def _send_scene(self) -> None:
+        """Send the plan in space, if the page shows it."""
+        if self._shows_scene and self._last is not None and not self._superseded:
+            self._send(scene_answer(self._n, self._last, self._units))
+
+    def _moved_alone(self) -> str | None:
+        """The name of the only vehicle that the drag moves; None if it moves several, or a zone."""
+        moved = {found[1] if (found := _PLACE_OF.match(place)) else "" for place in self._edits.live}
+        number = next(iter(moved), "")
+        return self._names[int(number)] if len(moved) == 1 and number and int(number) < len(self._names) else None
 
     # -- the state -----------------------------------------------------------------------------------------------
 
@@ -309,6 +347,7 @@ class MapSession:
         self._find_tiles(document, frame)
         vehicles = vehicles_of(document, frame)
         self._names = [v["name"] for v in vehicles]
+        self._vehicle = min(self._vehicle, max(len(vehicles) - 1, 0))
         where = str(edits.store.place)
         entries: dict[str, Any] = {}
         with suppress(InputError):
@@ -321,10 +360,10 @@ class MapSession:
             "files": terrain_choices(edits.store.folder), "base": self._base,
             "units": {"name": self._units.name, "systems": list(SYSTEMS), "kinds": self._units.as_dict()},
             "bounds": _bounds_of(vehicles) or (self._tiles.bounds if self._tiles is not None else None),
-            "terrain": self._terrain(), "vehicles": vehicles,
+            "terrain": self._terrain(), "vehicles": vehicles, "vehicle": self._vehicle, "arrival": arrival_of(document),
             "zones": zones_geojson(document, entries, frame, self._units),
             "counts": {key: len(document.get(key) or ()) for key in ("no_fly", "keep_in")},
-            "form": form_of(document, self._problems) if edits.stage == "mission" else [],
+            "form": form_of(document, self._problems, self._vehicle) if edits.stage == "mission" else [],
             "problems": [{"where": p.key, "message": p.message} for p in self._problems],
         }  # fmt: skip
 
@@ -351,6 +390,13 @@ class MapSession:
             "contours": f"contours/{self._revision}/{self._units.name}/{{z}}/{{x}}/{{y}}.json",
             "contours_m": [contour_interval_m(zoom, self._units.height) for zoom in range(MOST_ZOOM + 1)],
         }  # fmt: skip
+
+
+def _number(value: object) -> int:
+    """The number of a vehicle. Raises PageError."""
+    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < MOST_VEHICLES_OF_FILE:
+        raise PageError("vehicle is the number of a vehicle, from 0", code="bad_message", where="vehicle")
+    return value
 
 
 def _is_live(message: Mapping[str, Any]) -> bool:

@@ -51,7 +51,8 @@ def vehicles_of(document: EditedDocument, frame: Frame | None) -> list[dict[str,
         via = one.get("via")
         places = [place_of(v, frame) for v in via] if isinstance(via, list) else []
         found.append({
-            "key": f"vehicles[{k}]", "name": str(one.get("name", "")), "autopilot": str(one.get("autopilot", "")),
+            "key": f"vehicles[{k}]", "name": str(one.get("name", "")), "sysid": one.get("sysid"),
+            "autopilot": str(one.get("autopilot", "")),
             "start": place_of(one.get("start"), frame), "goal": place_of(one.get("goal"), frame),
             "via": [p for p in places if p is not None], "editable": frame is None and None not in places,
         })  # fmt: skip
