@@ -346,6 +346,8 @@ class MapSession:
         frame = _frame_of(document)
         self._find_tiles(document, frame)
         vehicles = vehicles_of(document, frame)
+        if self._names and len(vehicles) == len(self._names) + 1:
+            self._vehicle = len(vehicles) - 1  # a new vehicle is the chosen one
         self._names = [v["name"] for v in vehicles]
         self._vehicle = min(self._vehicle, max(len(vehicles) - 1, 0))
         where = str(edits.store.place)

@@ -34,7 +34,9 @@ except ModuleNotFoundError as missing:
 HOST = "127.0.0.1"
 STATIC = Path(__file__).parent / "static"
 REPORT = Path(__file__).parents[1] / "report" / "assets"
-REPORT_FILES = ("report.css", "numbers.js", "labels.js")
+REPORT_FILES = (
+    "report.css", "numbers.js", "labels.js", "base.js", "view.js", "flight.js", "replay.js", "mesh.js", "scene.js"
+)  # fmt: skip
 """Assets of the report that the page uses, too."""
 
 MAP_FILES = ("maplibre-gl.js", "maplibre-gl.css")

@@ -18,9 +18,9 @@ export function startGrips() {
 
 export const holding = () => held !== null;
 
-// `given`: id, kind (its class), label (its name), words (beside it), at, live(at), drop(at), cancel(), remove() or null.
+// `given`: id, kind and tone (its classes), label (its name), words (beside it), at, live(at), drop(at), cancel(), chosen(), remove() or null; without live it stands still.
 export function addGrip(given) {
-  const made = button('', () => {}, { class: `point ${given.kind}`, id: given.id, 'aria-label': given.label, title: given.label });
+  const made = button('', () => {}, { class: `point ${given.kind} ${given.tone || ''}`, id: given.id, 'aria-label': given.label, title: given.label });
   if (given.words) {
     const words = document.createElement('b');
     words.textContent = given.words;
@@ -34,6 +34,7 @@ export function addGrip(given) {
   made.addEventListener('pointerdown', (event) => grab(grip, event));
   made.addEventListener('keydown', (event) => key(grip, event));
   made.addEventListener('blur', () => settle(grip));
+  made.addEventListener('focus', () => { if (grip.chosen) grip.chosen(); });
   return grip;
 }
 
@@ -56,7 +57,7 @@ function put(grip) {
 
 // From a press to the release; the point keeps its distance from the pointer.
 export function grab(grip, event) {
-  if (event.button !== 0) return;
+  if (event.button !== 0 || !grip.live) return;
   event.preventDefault();
   event.stopPropagation();
   const { made } = grip, [x, y] = pixel(grip.at), box = canvas().getBoundingClientRect();
@@ -92,7 +93,7 @@ const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], Arrow
 
 function key(grip, event) {
   const way = ARROWS[event.key];
-  if (way && !event.ctrlKey && !event.altKey && !event.metaKey) {
+  if (way && grip.live && !event.ctrlKey && !event.altKey && !event.metaKey) {
     const step = event.shiftKey ? FINE_PX : STEP_PX;
     held = grip;
     moveGrip(grip, moved(grip.at, step * way[0], step * way[1]));

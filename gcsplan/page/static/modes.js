@@ -78,5 +78,5 @@ export function startModes() {
     if (wanted.dataset.mode === modeNow()) leave(); else enter(wanted.dataset.mode);
     canvas().focus({ preventScroll: true });
   });
-  on('state', (state) => { for (const id of ['draw', 'legend']) byId(id).hidden = state.stage !== 'mission'; });
+  on('state', (state) => { for (const id of ['draw', 'views', 'legend']) byId(id).hidden = state.stage !== 'mission'; });
 }

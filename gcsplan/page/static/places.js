@@ -34,7 +34,7 @@ function say(words) {
 
 function show(state) {
   if (box.querySelector('[data-dirty]')) return; // what is being typed stays
-  refill(box, ...state.vehicles.filter((v) => v.editable).flatMap((v, i) => ofVehicle(v, i, state.vehicles.length > 1)));
+  refill(box, ...state.vehicles.flatMap((v, i) => (v.editable && i === state.vehicle ? ofVehicle(v, i, state.vehicles.length > 1) : [])));
 }
 
 function ofVehicle(v, i, many) {
@@ -42,7 +42,7 @@ function ofVehicle(v, i, many) {
   const rows = [row(`place-${i}-start`, 'Start', v.start, (text) => change({ [`${v.key}.start`]: text }), 'start')];
   v.via.forEach((at, k) => rows.push(row(`place-${i}-via-${k}`, `Via ${k + 1}`, at, (text) => via(k, text), null, () => changeVia(v, v.via.filter((_, j) => j !== k)))));
   rows.push(row(`place-${i}-goal`, 'Goal', v.goal, (text) => change({ [`${v.key}.goal`]: text }), 'goal'));
-  return [el('h2', {}, many ? v.name : 'Route'), ...rows];
+  return [el('h2', {}, many ? `Route of ${v.name}` : 'Route'), ...rows];
 }
 
 function row(id, label, at, put, mode, remove) {

@@ -1,19 +1,22 @@
 // The profile along the path: ground, limits, path. A pointer here marks the place on the map, and one there marks it here.
 import { byId, degrees, el, refill, svg } from './dom.js';
-import { known, on, worded } from './hub.js';
+import { known, on, tell, worded } from './hub.js';
+import { choose, toneOf } from './fleet.js';
 import { canvas, frame, pixel } from './map.js';
 import { pointed } from './shapes.js';
 import { holding } from './grips.js';
 
 const ALL = 10000, NEAR_PX = 14;
-let shown = null, vehicle = 0, at = -1, plot = null, cursor = null, range = null;
+let shown = null, vehicle = -1, at = -1, flown = [], plot = null, cursor = null, range = null, own = 0;
 
 export function startProfile() {
   on('judged', draw);
   on('state', (state) => {
     if (state.stage !== 'mission' || !byId('below').children.length) draw(null);
     byId('below').hidden = state.stage === 'empty';
+    if (shown && state.vehicle !== vehicle && known.plan) { const old = byId('below').classList.contains('old'); draw(known.plan); byId('below').classList.toggle('old', old); }
   });
+  on('replayed', (now) => { flown = now ? now.spots : []; showFlown(); });
   let scheduled = null;
   frame().addEventListener('pointermove', (event) => {
     if (!scheduled) requestAnimationFrame(() => { const e = scheduled; scheduled = null; overMap(e); });
@@ -31,11 +34,21 @@ function draw(plan) {
   shown = null;
   if (!flights.length) { box.replaceChildren(el('p', { class: 'note' }, 'The profile along the path appears with the first mission.')); return; }
   box.classList.remove('old');
+  vehicle = known.state.vehicle;
   const one = flights.find((v) => v.vehicle === vehicle) || flights[0];
   shown = one.profile;
-  const choice = flights.length > 1 ? el('select', { id: 'profile-of', 'aria-label': 'Profile of', onchange: (event) => { vehicle = Number(event.target.value); draw(plan); } },
+  const choice = flights.length > 1 ? el('select', { id: 'profile-of', 'aria-label': 'Profile of', onchange: (event) => choose(Number(event.target.value)) },
     ...flights.map((v) => el('option', { value: v.vehicle, selected: v === one }, v.name))) : null;
-  refill(box, choice, chart(shown));
+  refill(box, choice, chart(shown, toneOf(one.vehicle)));
+  own = one.vehicle;
+  showFlown();
+}
+
+// The vehicle of the replay, on its path.
+function showFlown() {
+  if (!shown || !plot) return;
+  const spot = flown.find((s) => s.vehicle === own), dot = plot.querySelector('.craft');
+  dot.setAttribute('d', spot && spot.along_m !== null ? `M${(ALL * spot.along_m) / range.end} ${(ALL * (range.y1 - spot.amsl_m)) / (range.y1 - range.y0)}h0` : '');
 }
 
 const line = (xs, ys) => {
@@ -64,7 +77,7 @@ function band(xs, low, high) {
   return text;
 }
 
-function chart(p) {
+function chart(p, tone) {
   const end = p.distance_m[p.distance_m.length - 1] || 1, heights = [...p.ground_m, ...p.path_m, ...p.lowest_m].filter((v) => v !== null);
   const low = Math.min(...heights), high = Math.max(...heights, ...near(p, heights)), room = 0.06 * (high - low) || 10;
   range = { end, y0: low - room, y1: high + room };
@@ -72,7 +85,7 @@ function chart(p) {
   const xs = p.distance_m.map((d) => (ALL * d) / end), top = xs.map(() => 0), floor = xs.map(() => ALL);
   const shapes = [
     ['above', band(xs, ys(p.highest_m), top)], ['below', band(xs, ys(p.ground_m), ys(p.lowest_m))], ['ground', band(xs, floor, ys(p.ground_m))],
-    ['ceiling', line(xs, ys(p.highest_m))], ['floor', line(xs, ys(p.lowest_m))], ['casing', line(xs, ys(p.path_m))], ['track t0', line(xs, ys(p.path_m))],
+    ['ceiling', line(xs, ys(p.highest_m))], ['floor', line(xs, ys(p.lowest_m))], ['casing', line(xs, ys(p.path_m))], [`track ${tone}`, line(xs, ys(p.path_m))], [`craft ${tone}`, ''],
   ].map(([kind, d]) => svg('path', { class: kind, d }));
   const far = known.state.units.kinds.far, height = known.state.units.kinds.amsl;
   cursor = svg('path', { class: 'cursor' });
@@ -94,7 +107,7 @@ function chart(p) {
     onpointermove: overPlot, onpointerdown: overPlot, onpointerleave: () => point(-1), onkeydown: key, onblur: () => point(-1),
   }, svg('svg', { viewBox: `0 0 ${ALL} ${ALL}`, preserveAspectRatio: 'none', 'aria-hidden': 'true' }, grids, ...shapes, cursor));
   return el('figure', { class: 'chart' }, el('div', { class: 'ylabel' }, height[0]), yticks, plot, xticks,
-    el('div', { class: 'foot' }, legend(p), el('span', { class: 'xlabel' }, `along the path, ${far[0]}`)));
+    el('div', { class: 'foot' }, legend(p, tone), el('span', { class: 'xlabel' }, `along the path, ${far[0]}`)));
 }
 
 // The highest allowed, as far as it belongs in the picture.
@@ -111,10 +124,10 @@ function steps(from, to, unit, count) {
   return made;
 }
 
-function legend(p) {
+function legend(p, tone) {
   const item = (kind, words) => el('li', {}, el('i', { class: kind }), words), limit = (list) => list.some((v) => v !== null);
   return el('ul', { class: 'legend' }, item('swatch ground', 'ground'), limit(p.lowest_m) ? item('swatch below', 'too low') : null,
-    limit(p.highest_m) ? item('swatch above', 'too high') : null, item('stroke path', 'path'));
+    limit(p.highest_m) ? item('swatch above', 'too high') : null, item(`stroke path ${tone}`, 'path'));
 }
 
 // -- the place that is pointed at -------------------------------------------------------------------------------------
@@ -122,6 +135,7 @@ function legend(p) {
 function point(i, event) {
   at = i;
   if (!shown) return;
+  tell('pointed', i < 0 ? null : [shown.lat[i], shown.lon[i]]);
   if (i < 0 || byId('below').classList.contains('old')) { pointed(null); cursor.setAttribute('d', ''); hideTip(); return; }
   pointed([shown.lat[i], shown.lon[i]]);
   cursor.setAttribute('d', `M${(ALL * shown.distance_m[i]) / range.end} 0V${ALL}`);

@@ -20,12 +20,13 @@ export function startResult() {
   on('home', home);
   on('refused', refused);
   on('asked', () => { current = null; planning(); });
-  on('dragged', () => { if (current) { agePath(); follows(); } });
+  on('dragged', (changes) => { if (current) { agePath(moved(changes)); follows(); } });
   on('error', (message) => {
     if (message.code === 'bad_mission') nothing(message.message, 'The mission has a mistake');
     if (message.code === 'bad_change') for (const answer of before) ({ plan, home, refused })[answer.type](answer);
   });
   on('connection', (now) => { if (now !== 'open') nothing('The result below may be old.', 'Not connected'); });
+  on('state', (state) => { for (const one of box.querySelectorAll('#rest > [data-vehicle]')) one.open = Number(one.dataset.vehicle) === state.vehicle; });
   on('state', (state) => {
     if (state.stage === 'mission') { if (!known.plan) planning(); return; }
     clearPath();
@@ -38,6 +39,12 @@ export function startResult() {
     verdict('unjudged', '1', 'Start and goal', 'Click both on the map, or type them below.');
   });
   return box;
+}
+
+// The numbers of the vehicles that a drag moves; undefined for a zone, which is in the way of all.
+function moved(changes) {
+  const found = Object.keys(changes).map((key) => /^vehicles\[(\d+)\]/.exec(key));
+  return found.every((f) => f) ? found.map((f) => Number(f[1])) : undefined;
 }
 
 const planning = () => verdict('unjudged', '…', 'Planning', 'The mission is planned and judged.');
@@ -88,7 +95,7 @@ function plan(message) {
   }
   drawNoHome(message.vehicles.flatMap((v) => (v.way_home ? v.way_home.unsafe : [])));
   markPlace(null);
-  judged(message.verdict, message.vehicles.map((v) => v.way_home), message.headline);
+  judged(message, message.vehicles.map((v) => v.way_home), message.headline);
   showGap(null);
   const rest = box.querySelector('#rest');
   rest.classList.remove('old');
@@ -98,7 +105,9 @@ function plan(message) {
 }
 
 // A mission is called safe with all its returns; before they are judged, or where one is unsafe, its path alone is.
-function judged(word, homes, words) {
+function judged({ verdict: word, fleet }, homes, words) {
+  const apart = fleet && fleet.separation;
+  if (word === 'safe' && apart && !apart.safe) { verdict('unjudged', '!', 'paths safe, not apart', apart.text); return; }
   const [look, sign] = LOOK[word] || LOOK['not judged'], returns = homes.every((home) => home && home.safe === true);
   if (word !== 'safe' || returns) verdict(look, sign, word, words);
   else if (homes.some((home) => home && home.safe !== true)) verdict('unjudged', '!', 'path safe', words);
@@ -108,8 +117,9 @@ function judged(word, homes, words) {
 function ofVehicle(v, many) {
   const rows = v.figures.filter((f) => f.key !== 'verdict').map(figure);
   if (!v.way_home) rows.push(el('div', { 'data-home': v.vehicle }, el('dt', {}, 'Way home'), el('dd', {}, 'being judged')));
-  return [many ? el('h3', {}, v.name) : null, el('dl', {}, ...rows), list('Findings', v.findings, true), list('Not judged', v.not_judged, true),
-    homeWords(v.vehicle, v.way_home), list('Notes', v.notes, false)].filter((p) => p);
+  const parts = [el('dl', {}, ...rows), list('Findings', v.findings, true), list('Not judged', v.not_judged, true), homeWords(v.vehicle, v.way_home), list('Notes', v.notes, false)].filter((p) => p);
+  if (!many) return parts;
+  return [el('details', { 'data-vehicle': v.vehicle, open: v.vehicle === known.state.vehicle }, el('summary', {}, `${v.name}: ${v.verdict === 'safe' ? 'path safe' : v.verdict}`), ...parts)];
 }
 
 const list = (name, items, open) => (items.length ? el('details', { open }, el('summary', {}, `${name} (${items.length})`), el('ul', {}, ...items.map((i) => el('li', {}, i)))) : null);
@@ -126,7 +136,7 @@ const homeWords = (vehicle, way) => el('p', { class: `bare${way && way.unsafe.le
 function home(message) {
   if (!current || current.n !== message.n) return;
   before = [current, message];
-  judged(current.verdict, current.vehicles.map((v) => message.vehicles.find((h) => h.vehicle === v.vehicle)?.way_home), message.headline);
+  judged(current, current.vehicles.map((v) => message.vehicles.find((h) => h.vehicle === v.vehicle)?.way_home), message.headline);
   drawNoHome(message.vehicles.flatMap((v) => (v.way_home ? v.way_home.unsafe : [])));
   for (const v of message.vehicles) {
     const row = box.querySelector(`[data-home="${v.vehicle}"]`);
@@ -156,7 +166,8 @@ function refused(message) {
   rest.classList.remove('old');
   rest.replaceChildren(
     ...(message.at ? [el('p', {}, button('Show the place', () => goTo(message.at), { class: 'wide' }))] : []),
-    ...(message.cures.length ? [el('h3', {}, 'These would do'), ...message.cures.map(cure)] : []));
+    ...(message.cures.length ? [el('h3', {}, 'These would do'), ...message.cures.map(cure)] : []),
+    ...(message.attempts.length ? [el('h3', {}, 'These may do'), ...message.attempts.map(cure)] : []));
 }
 
 function cure(given) {

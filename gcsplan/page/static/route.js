@@ -2,11 +2,13 @@
 import { degrees } from './dom.js';
 import { known, on } from './hub.js';
 import { addGrip, grab, holding, moveGrip, removeGrip } from './grips.js';
+import { choose, many, toneOf } from './fleet.js';
 import { change, live, step } from './link.js';
 import { canvas, frame, pixel, placeAt } from './map.js';
 import { addMode, enter, leave, modeNow } from './modes.js';
 import { lineOf } from './shapes.js';
 
+const MOST_SHOWN = 12; // of more vehicles than this, the chosen one alone has points that are dragged
 let grips = [];
 
 export function startRoute() {
@@ -20,7 +22,7 @@ export function startRoute() {
   addMode({ name: 'via', hint: 'Click a place that the path has to pass.', click: (place) => { leave(); insertVia(place); } });
   on('state', redraw);
   on('error', (message) => { if (message.code === 'bad_change') redraw(known.state); }); // the point goes back
-  document.addEventListener('pointerdown', (event) => { if (event.target.id === 'path-grasp' && event.pointerType !== 'touch' && !modeNow()) pull(event); }, true); // a finger moves the map
+  document.addEventListener('pointerdown', (event) => { if (event.target.classList?.contains('grasp') && event.pointerType !== 'touch' && !modeNow()) pull(event); }, true); // a finger moves the map
 }
 
 function cancel() {
@@ -34,15 +36,16 @@ export function changeVia(vehicle, list) {
 
 function wanted(state) {
   return state.vehicles.flatMap((vehicle, v) => {
-    const many = state.vehicles.length > 1 ? `${vehicle.name} ` : '';
+    if (state.vehicles.length > MOST_SHOWN && v !== state.vehicle) return [];
+    const whose = many() ? `${vehicle.name} ` : '', mine = { tone: toneOf(v), chosen: () => choose(v) };
     const single = (name) => vehicle[name] && {
-      id: `grip-${v}-${name}`, kind: name, words: many + name, at: vehicle[name],
+      id: `grip-${v}-${name}`, kind: name, ...mine, words: whose + name, at: vehicle[name],
       live: (at) => live({ [`${vehicle.key}.${name}`]: at }), drop: (at) => change({ [`${vehicle.key}.${name}`]: at }),
     };
     const via = vehicle.via.map((place, i) => {
       const put = (at) => vehicle.via.map((other, k) => (k === i ? at : other));
       return {
-        id: `grip-${v}-via-${i}`, kind: 'via', words: `${i + 1}`, at: place,
+        id: `grip-${v}-via-${i}`, kind: 'via', ...mine, words: `${i + 1}`, whose, at: place,
         live: (at) => live({ [`${vehicle.key}.via`]: put(at) }), drop: (at) => changeVia(vehicle, put(at)),
         remove: () => changeVia(vehicle, vehicle.via.filter((_, k) => k !== i)),
       };
@@ -67,7 +70,7 @@ function redraw(state) {
 }
 
 function name(grip) {
-  const what = grip.kind === 'via' ? `via ${grip.words}` : grip.words;
+  const what = grip.kind === 'via' ? `${grip.whose}via ${grip.words}` : grip.words;
   grip.made.setAttribute('aria-label', `${what} at ${degrees(grip.at)}; arrow keys move it${grip.remove ? ', Delete removes it' : ''}`);
 }
 

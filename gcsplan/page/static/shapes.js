@@ -1,26 +1,27 @@
 // What lies over the ground: zones, the path, stretches without a way home. One SVG, moved as a whole with the map.
 import { el, svg } from './dom.js';
 import { known, on } from './hub.js';
+import { many, toneOf } from './fleet.js';
 import { frame, local, metres, pixel, size, transformation } from './map.js';
 
 const d = (places, closed = false) => (places.length
   ? `M${places.map((p) => local(p).map((v) => v.toFixed(2)).join(' ')).join('L')}${closed ? 'Z' : ''}` : '');
 
 const layers = {};
-let whole = null, names = null, labels = [], mark = null, marked = null;
+let whole = null, names = null, labels = [], mark = null, marked = null, crafts = null;
 
 export function startShapes() {
   whole = svg('g', { transform: '' });
   for (const name of ['zones', 'sketch', 'nohome', 'casing', 'path', 'hit', 'pointed']) whole.append(layers[name] = svg('g', { class: name }));
-  layers.casing.append(svg('path', { class: 'casing' }));
-  layers.path.append(svg('path', { class: 'track t0', id: 'path' }));
-  layers.hit.append(svg('path', { class: 'grasp', id: 'path-grasp' }));
   layers.pointed.append(svg('path', { class: 'cursor', id: 'pointed' }));
   names = el('div', { class: 'marks', 'aria-hidden': 'true' });
   mark = el('div', { class: 'mark broken', hidden: true }, el('b'));
-  frame().append(svg('svg', { class: 'shapes', 'aria-hidden': 'true' }, whole), names, mark);
+  crafts = el('div', { class: 'crafts', 'aria-hidden': 'true' });
+  frame().append(svg('svg', { class: 'shapes', 'aria-hidden': 'true' }, whole), names, mark, crafts);
   on('moved', follow);
   on('rested', layNames);
+  on('replayed', drawCrafts);
+  on('state', () => { for (const [vehicle, track] of tracks) dress(vehicle, track); });
   on('state', (state) => { drawZones(state.zones.features); layNames(); follow(); });
 }
 
@@ -28,6 +29,7 @@ function follow() {
   whole.setAttribute('transform', transformation());
   for (const label of labels) put(label.made, label.at);
   if (marked) put(mark, marked);
+  for (const craft of flying) put(craft.made, craft.at);
 }
 
 function put(made, at) {
@@ -110,26 +112,49 @@ export function sketch(zone) {
 
 // `flat`: lat, lon, amsl_m, lat, …; `how`: judged, draft, unsafe or old.
 const lines = new Map();
+const tracks = new Map(); // by vehicle: casing, path and what is grasped, and how the path is drawn
+let flying = [];
 export const places = (flat) => Array.from({ length: Math.floor(flat.length / 3) }, (_, i) => [flat[3 * i], flat[3 * i + 1]]);
 
 export function drawPath(vehicle, flat, how) {
   lines.set(vehicle, places(flat));
-  const text = [...lines.values()].map((line) => d(line)).join('');
-  const path = layers.path.firstChild;
-  path.setAttribute('d', text);
-  path.setAttribute('class', `track t0 ${how}`);
-  layers.casing.firstChild.setAttribute('d', text);
-  layers.hit.firstChild.setAttribute('d', text);
+  const text = d(lines.get(vehicle)), track = tracks.get(vehicle) || newTrack(vehicle);
+  for (const part of ['casing', 'path', 'hit']) track[part].setAttribute('d', text);
+  track.how = how;
+  dress(vehicle, track);
   if (!whole.getAttribute('transform')) follow();
 }
 
-export function agePath() {
-  if (lines.size) layers.path.firstChild.setAttribute('class', 'track t0 old');
+// All paths, or those of some vehicles, are of before.
+export function agePath(vehicles = [...tracks.keys()]) {
+  for (const [vehicle, track] of tracks) {
+    if (!vehicles.includes(vehicle)) continue;
+    track.how = 'old';
+    dress(vehicle, track);
+  }
+}
+
+function newTrack(vehicle) {
+  const id = vehicle ? `path-${vehicle}` : 'path', made = { casing: svg('path', { class: 'casing' }), path: svg('path', { id }), hit: svg('path', { class: 'grasp', id: `${id}-grasp` }), how: '' };
+  for (const part of ['casing', 'path', 'hit']) layers[part].append(made[part]);
+  tracks.set(vehicle, made);
+  return made;
+}
+
+const dress = (vehicle, track) => track.path.setAttribute('class', `track ${toneOf(vehicle)} ${track.how}${many() && known.state.vehicle === vehicle ? ' chosen' : ''}`);
+
+// Where the vehicles of the replay are; null for none.
+function drawCrafts(shown) {
+  flying = (shown ? shown.spots : []).map(({ vehicle, name, at }) => ({ at, made: el('i', { class: `craft ${toneOf(vehicle)}`, 'data-vehicle': vehicle }, many() ? el('b', {}, name) : null) }));
+  crafts.classList.toggle('many', flying.length > 100);
+  crafts.replaceChildren(...flying.map((craft) => craft.made));
+  for (const craft of flying) put(craft.made, craft.at);
 }
 
 export function clearPath() {
   lines.clear();
-  for (const name of ['path', 'casing', 'hit']) layers[name].firstChild.setAttribute('d', '');
+  tracks.clear();
+  for (const name of ['path', 'casing', 'hit']) layers[name].replaceChildren();
 }
 
 export const lineOf = (vehicle) => lines.get(vehicle) || [];
@@ -145,11 +170,12 @@ export function pointed(place) {
   layers.pointed.firstChild.setAttribute('d', place ? `${d([place])}h0` : '');
 }
 
-// A place with words, such as the one that stands in the way; null takes it away.
-export function markPlace(place, words) {
+// A place with words, such as the one that stands in the way, or (tight) one that is near; null takes it away.
+export function markPlace(place, words, look = 'broken') {
   marked = place;
   mark.hidden = !place;
   if (!place) return;
+  mark.className = `mark ${look}`;
   mark.firstChild.textContent = words;
   put(mark, place);
 }

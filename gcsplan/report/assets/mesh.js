@@ -57,7 +57,7 @@ function mesh(gl, mode, columns, indices) {
   return {
     free() { for (const made of [...buffers.map((b) => b[2]), order]) gl.deleteBuffer(made); },
     draw(p) {
-      for (const name of ['p', 'q', 'corner']) if (p.attributes[name] >= 0) gl.disableVertexAttribArray(p.attributes[name]);
+      for (let place = 0; place < 3; place++) gl.disableVertexAttribArray(place); // another program's buffer may be gone
       for (const [name, width, buffer] of buffers) {
         const place = p.attributes[name];
         if (place < 0) continue;
