@@ -22,7 +22,7 @@ from gcsplan.cli.output.console import plan_row
 from gcsplan.cli.output.verdict_table import verdict_table
 from gcsplan.export.summary import write_summary
 from gcsplan.figures import floored, steepened
-from tests.support.plans import CASES, SLOW, cases, flown, planned, reported, text_rows, written
+from tests.support.plans import CASES, FLOWN_LONG, SLOW, cases, flown, planned, reported, text_rows, written
 from tests.support.shown import number, seconds
 
 pytestmark = pytest.mark.xdist_group("plans")  # one process plans the missions, not three
@@ -181,7 +181,8 @@ def test_the_check_of_the_written_file_finds_it(case: str, tmp_path: Path, capsy
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("case", [name for name in CASES if name not in SLOW])
+@pytest.mark.parametrize("case", [n for n in CASES if n not in SLOW])
+@pytest.mark.nightly_but(*CASES.keys() - FLOWN_LONG)
 def test_a_rehearsal_has_the_plans_numbers_beside_what_was_flown(case: str) -> None:
     _, done = planned(case)
     found = flown(case)

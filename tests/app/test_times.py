@@ -23,15 +23,13 @@ from gcsplan.fleet.arrival import Slot
 from gcsplan.fleet.motion.timing import TimedPath
 from gcsplan.mission_file import load_mission
 from gcsplan.units import duration
-from tests.support.plans import CASES, cases, flown, planned, reported, text_rows, written
+from tests.support.plans import CASES, FLOWN_LONG, cases, flown, planned, reported, text_rows, written
 from tests.support.shown import seconds
 
 SAME_S = 1e-6
 """Seconds by which two sums of the same times may differ."""
 
 pytestmark = pytest.mark.xdist_group("plans")  # one process plans the missions, not three
-
-FLOWN_QUICKLY = {"a hold at the gate", "one that leaves later", "terrain frame and return"}
 
 
 def parts(done: Plan) -> list[tuple[VehiclePlan, Slot, TimedPath]]:
@@ -110,10 +108,9 @@ def test_the_check_of_the_written_file_says_the_same_times(case: str, tmp_path: 
             assert times == pytest.approx([leg.time_s for leg in v.verdict.legs], abs=1e-3)
 
 
-@pytest.mark.first_quick
-@pytest.mark.parametrize(
-    "case", [pytest.param(name, marks=[] if name in FLOWN_QUICKLY else [pytest.mark.slow]) for name in CASES]
-)
+@pytest.mark.slow
+@pytest.mark.nightly_but(*CASES.keys() - FLOWN_LONG)
+@pytest.mark.parametrize("case", CASES)
 def test_a_rehearsal_compares_with_the_planned_time(case: str) -> None:
     _, done = planned(case)
     found = flown(case)

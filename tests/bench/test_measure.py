@@ -118,6 +118,7 @@ def test_peak_memory_is_that_of_the_block() -> None:
     assert 55.0 < memory.peak_mb < 120.0
 
 
+@pytest.mark.slow
 def test_the_rank_test_is_scipys_on_made_runs() -> None:
     from scipy.stats import mannwhitneyu  # slow to import, for every process that collects
 

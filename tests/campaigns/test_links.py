@@ -67,6 +67,7 @@ def silent_for_four_seconds() -> list[str]:
     return found
 
 
+@pytest.mark.slow
 def test_the_campaign_finds_an_upload_that_does_not_look_after_a_silence(monkeypatch: pytest.MonkeyPatch) -> None:
     assert silent_for_four_seconds() == []
     monkeypatch.setattr("gcsplan.mavlink.link.session.recheck.FRESH_S", 1e9)

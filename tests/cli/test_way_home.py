@@ -170,6 +170,7 @@ def test_what_could_not_be_judged_is_refused_where_a_safe_return_is_required(
     assert json.loads(text[: text.rindex("}") + 1])["error"]["reason"] == "not_judged"
 
 
+@pytest.mark.slow
 def test_where_a_safe_return_is_required_nothing_flyable_is_left_and_nothing_is_sent(run: Any, tmp_path: Path) -> None:
     mission = write(tmp_path)
     assert run("plan", mission)[0] == 0
@@ -190,7 +191,7 @@ def test_where_a_safe_return_is_required_nothing_flyable_is_left_and_nothing_is_
     assert not flyable(tmp_path / "script")
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("way", ["plan", "upload"])
 def test_a_vehicle_with_another_return_altitude_is_refused_before_anything_is_sent(
     run: Any, tmp_path: Path, planned: Path, way: str
@@ -241,6 +242,7 @@ def test_an_rtl_item_is_judged_at_the_altitude_of_the_vehicle_before_it_is_sent(
     assert run("plan", mission, "--upload", "sim")[0] == 0  # nobody has set a simulated vehicle's altitude
 
 
+@pytest.mark.slow
 def test_what_was_judged_is_not_called_unchecked_and_the_vehicles_own_name_is_told(run: Any, tmp_path: Path) -> None:
     code, text, _ = run("plan", write(tmp_path), "--way-home", "--upload", "sim")
     assert code == 0, text

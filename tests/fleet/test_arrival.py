@@ -346,7 +346,7 @@ def finish_of(crews: list[Crew], **more: Any) -> tuple[float, float]:
     return round(plan.slots[-1].arrive_s, 3), plan.energy_j
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [*range(6), *(pytest.param(s, marks=pytest.mark.nightly) for s in range(6, 30))])
 def test_the_best_order_finishes_as_early_as_the_best_of_all_orders(seed: int) -> None:
     rng = np.random.default_rng(seed)

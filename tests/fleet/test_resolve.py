@@ -332,7 +332,7 @@ def test_landing_on_one_pad_has_no_interval_that_works_while_nobody_clears_it() 
     assert refused.value.goals_m == 30.5
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize(("end", "clear_s"), [("land", 20.0), ("none", math.inf)])
 def test_the_smallest_interval_at_one_goal_works_and_a_tenth_less_does_not(end: MissionEnd, clear_s: float) -> None:
     crews = fan(2, 0.0, end)

@@ -100,6 +100,8 @@ CASES: dict[str, Any] = {
 }  # fmt: skip
 
 SLOW = {"fleet-4", "a paper's"}
+FLOWN_LONG = {*SLOW, "jacksboro", "jacksboro-high"}
+"""Cases whose rehearsal takes seconds."""
 
 
 @cache

@@ -422,6 +422,7 @@ def test_thousands_of_zones_are_found_through_the_lattice_as_one_by_one() -> Non
 # --- the whole check -------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_clear_says_what_examine_says_of_ten_thousand_legs_over_mountains() -> None:
     rng = np.random.default_rng(4)
     ground = jacksboro()

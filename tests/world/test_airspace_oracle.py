@@ -54,6 +54,7 @@ def nearly_touching(
     return -lift if kind == "max_agl" else lift
 
 
+@pytest.mark.nightly_but("turned", "sample")
 @pytest.mark.parametrize(
     ("make", "worlds", "seed"),
     [(in_plane, 45, 1), (in_plane, 45, 2), (turned, 45, 3), (in_degrees, 9, 4), (sample, 6, 5)],

@@ -16,6 +16,7 @@ from gcsplan.mission_file import load_mission
 from tests.support.noted import codes
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("number", "most_m"), [(64, 5425.0), pytest.param(38, 702.0, marks=pytest.mark.nightly)])
 def test_a_mission_over_hills_without_errors_is_planned_once(number: int, most_m: float) -> None:
     # Planned again with the margins of its short legs' climbs, 64 took 5,501 m and 38 took 714.
@@ -52,6 +53,7 @@ def test_a_moved_corner_is_turned_before_beyond_the_old_next_leg() -> None:
     assert np.array_equal(moved(straight, {1}, 1.0), straight)
 
 
+@pytest.mark.slow
 def test_paths_keep_of_the_climb_limit_what_rounding_takes_and_no_more() -> None:
     """One lap at the limit between two ends: with a margin of 0.2 % its gap was 0.29 %."""
     one = draw(12, 25)

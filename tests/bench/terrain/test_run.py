@@ -66,6 +66,7 @@ def test_wrong_orders_are_refused_before_anything_is_done(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.nightly_but("None-solved", "error3-failed")
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("error", "status"),

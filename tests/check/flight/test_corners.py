@@ -152,7 +152,8 @@ def test_a_radius_longer_than_the_leg_skips_way_points(autopilot: Autopilot) -> 
     assert verdict(one, inside(985.0, 400.0, 15.0)).safe is False
 
 
-@pytest.mark.first_quick
+@pytest.mark.nightly_but("px4-0", "px4-1", "arduplane-0")
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("autopilot", [PX4, PLANE])
 def test_no_straight_line_from_where_it_turns_leaves_what_is_judged(autopilot: Autopilot, seed: int) -> None:

@@ -681,6 +681,7 @@ def trouble_of(seed: int) -> dict[str, object]:
     ])  # fmt: skip
 
 
+@pytest.mark.nightly_but("arducopter-0", "px4-1")
 @pytest.mark.slow
 @pytest.mark.parametrize("chunk", seeds(2, 2, CHUNKS))
 @pytest.mark.parametrize("autopilot", [COPTER, PX4])

@@ -65,7 +65,7 @@ def is_clear(problem: Problem, points: Floats) -> bool:
     return bool(problem.airspace.clear(Legs.of_path(points, problem.limits), problem.limits).all())
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize(("seed", "degrees"), [(1, 10.0), pytest.param(2, 10.0, marks=pytest.mark.slow), (3, 15.0)])
 def test_crosses_real_ground_between_60_and_120_m(seed: int, degrees: float) -> None:
     p = band_mission(seed, degrees)
@@ -85,6 +85,7 @@ def test_a_plan_is_the_same_every_time_and_tells_of_its_progress() -> None:
     assert told[-1].cost == pytest.approx(Path(second).length_m)
 
 
+@pytest.mark.slow
 def test_zones_in_the_band_are_passed_over_under_and_around() -> None:
     bare = band_mission(5, 15.0)
     a, b = np.array(bare.start[:2]), np.array(bare.goal[:2])

@@ -312,9 +312,9 @@ def test_random_missions_on_the_sample_are_solved_safely(seed: int) -> None:
     assert faults_of_plan(random_mission(seed)) == []
 
 
-@pytest.mark.first_quick
-@pytest.mark.nightly_but("20", "21")
-@pytest.mark.parametrize("seed", [20, pytest.param(21, marks=pytest.mark.slow), 22])
+@pytest.mark.slow
+@pytest.mark.nightly_but("20")
+@pytest.mark.parametrize("seed", [20, 21, 22])
 def test_random_missions_under_the_120_m_rule(seed: int) -> None:
     assert faults_of_plan(random_mission(seed, replace(FIELD, min_agl_m=50.0, max_agl_m=120.0), zones=6)) == []
 

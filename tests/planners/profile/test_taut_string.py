@@ -72,7 +72,7 @@ def shortest_by_visibility(s: Floats, low: Floats, high: Floats, z0: float, z1: 
     return float(dijkstra(graph, indices=0)[-1])
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("block", [*range(4), *(pytest.param(n, marks=pytest.mark.nightly) for n in range(4, 8))])
 def test_is_shortest_climbs_least_and_is_least_steep_all_at_once(block: int) -> None:
     for seed in range(block * 30, block * 30 + 30):

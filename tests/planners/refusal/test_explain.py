@@ -40,6 +40,7 @@ def refused(
     return with_cures(replace(p, budget_s=30.0), caught.value, plan)  # enough even on a busy machine
 
 
+@pytest.mark.slow
 def test_ceiling_under_the_lowest_pass_names_the_pass_and_the_limit_that_would_do() -> None:
     e = refused(ground(ridge), limits=replace(LOW, max_amsl_m=150.0))
     assert e.reason == "infeasible"

@@ -233,7 +233,7 @@ def way_below(problem: Problem, step_m: float = 100.0) -> Floats:
     return np.column_stack([way[out], np.full(len(out), ceiling)])
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 2])
 def test_paths_between_hills_are_rounded_and_climb_no_steeper_than_allowed(seed: int) -> None:
     problem = hills(seed, 145.0)
@@ -287,7 +287,8 @@ def test_a_via_on_a_nearly_straight_way_is_passed_at_its_altitude(aside_m: float
     assert len(found.way_points) == 3  # none so near to another that rounding on the wire turns the leg between them
 
 
-@pytest.mark.first_quick
+@pytest.mark.nightly_but("20.0", "150.0")
+@pytest.mark.slow
 @pytest.mark.parametrize("apart_m", [20.0, 100.0, 139.0, 150.0, 198.0])
 def test_vias_less_than_two_radii_apart_are_both_passed_with_a_detour(apart_m: float) -> None:
     vias = [(3000.0, 1000.0), (3000.0, 1000.0 + apart_m)]

@@ -50,7 +50,7 @@ def test_scale_factors_are_a_cauchy_distribution_drawn_again_below_0() -> None:
     np.testing.assert_allclose(np.quantile(got, at), np.quantile(wanted, at), rtol=0.04, atol=0.004)
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("function", ["f1", "f9"])
 def test_lshade_beats_de_at_equal_evaluations(function: str) -> None:
     cost = FUNCTIONS[function].on_unit_box(20, shifted=True)

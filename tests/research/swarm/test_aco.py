@@ -86,6 +86,7 @@ def test_an_ant_in_a_dead_end_is_dropped() -> None:
     assert (ways[:, 1] == 1).all()
 
 
+@pytest.mark.slow
 def test_ants_find_a_legal_way_round_a_wall() -> None:
     problem = mission(points=4, iterations=30)
     solution = get("aco").plan(problem)

@@ -124,7 +124,7 @@ def test_two_processes_that_compile_for_themselves_get_the_same_bytes(tmp_path: 
     assert found[0] == found[1] != ""
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.skipif(platform.machine().lower() not in ("x86_64", "amd64"), reason="names processors of one family")
 @pytest.mark.parametrize("processor", ["x86-64", "haswell"])
 def test_an_older_processors_instructions_give_the_same_bytes(

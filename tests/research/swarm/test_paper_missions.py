@@ -79,6 +79,7 @@ def test_straight_lines_are_the_papers(name: str, lengths: list[float]) -> None:
     assert [straight(p) for p in problems(name)] == pytest.approx(lengths, abs=0.06)
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize(
     ("name", "place", "height"),
     [
@@ -153,6 +154,7 @@ def test_every_scenario_is_planned_by_its_own_system_or_refused(name: str) -> No
         assert solution.path.length_m >= straight(p) - 1e-6
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("name", ["ssgwo-table3", "ib-abc-sequence"])
 def test_the_default_planner_flies_them(name: str) -> None:
     for p in problems(name)[:1]:

@@ -275,7 +275,7 @@ def test_a_refusal_has_a_place_on_real_ground() -> None:
 
 
 # With its own encoding of 30 points anywhere in the volume, SSGWO finds a repairable path for half of the seeds.
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "seed"), [("krill", 1), ("ssgwo", 4), ("msfoa", 1), ("abo", 1), ("ib-abc", 1)])
 def test_the_five_systems_plan_a_mission_over_real_ground(name: str, seed: int) -> None:
     mission = MISSIONS / "jacksboro-high.yaml"

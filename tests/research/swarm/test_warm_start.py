@@ -116,6 +116,7 @@ def fleet(warm: str) -> dict[str, Any]:
     }  # fmt: skip
 
 
+@pytest.mark.slow
 def test_the_vehicles_of_a_fleet_begin_around_the_path_of_one() -> None:
     planned = plan(fleet("uav2"), jobs=1).vehicles
     assert [v.name for v in planned] == ["uav1", "uav2", "uav3"]

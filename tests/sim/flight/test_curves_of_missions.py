@@ -24,6 +24,7 @@ def at(command: int, east: float, north: float = 0.0, up: float = 100.0, p1: flo
     return MissionItem(command, m.RELATIVE, (p1, 0.0, 0.0, 0.0), m.degrees_e7(lat), m.degrees_e7(lon), up)
 
 
+@pytest.mark.nightly_but("left-5.0", "half-15.0", "climbing-5.0", "spline-15.0")
 @pytest.mark.first_quick
 @pytest.mark.parametrize("speed_m_s", [5.0, pytest.param(15.0, marks=pytest.mark.slow)])
 @pytest.mark.parametrize(

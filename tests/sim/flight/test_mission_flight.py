@@ -24,7 +24,7 @@ def delay(seconds: float) -> MissionItem:
     return MissionItem(cmd.DELAY, m.NO_POSITION, (seconds, -1.0, -1.0, -1.0))
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize(("leg_m", "measured_m_s"), [(60.0, 7.0), (100.0, 4.0), (150.0, 3.0)])
 def test_a_lower_speed_on_the_move_takes_hold_as_slowly_as_on_a_real_arducopter(
     leg_m: float, measured_m_s: float
@@ -68,7 +68,7 @@ def test_a_leg_too_short_for_its_speed_is_a_triangle() -> None:
     assert flown.arrive_s[0] == pytest.approx(CLIMB_S + 2 * math.sqrt(20 / 1.5), abs=0.03)
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize(("rise_m", "rate_m_s"), [(200.0, 2.5), (-200.0, 1.5)])
 def test_a_steep_leg_is_flown_as_slowly_as_climb_and_descent_demand(rise_m: float, rate_m_s: float) -> None:
     way = track(at(cmd.TAKEOFF, 0, 0, 300), at(cmd.WAYPOINT, 0, 400, 300 + rise_m))

@@ -64,6 +64,7 @@ def test_neither_a_change_of_pitch_nor_a_way_point_on_a_line_costs_time() -> Non
     assert bent.arrive_s[0] == pytest.approx(straight.arrive_s[0], abs=0.1)
 
 
+@pytest.mark.slow
 def test_a_terrain_leg_follows_the_ground() -> None:
     def hill(east: np.ndarray, north: np.ndarray) -> np.ndarray:
         return GROUND_M + 40 * np.exp(-((north - 600) ** 2) / 200**2) + 0 * east

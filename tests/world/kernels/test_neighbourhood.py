@@ -62,7 +62,7 @@ def in_rows(extrema: LocalExtrema, z: Floats) -> tuple[Floats, Floats, Floats]:
     return slope, high, low
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(12))
 def test_it_bounds_all_that_is_around_and_hardly_more(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -110,7 +110,7 @@ def same_where_seen(part: LocalExtrema, whole: LocalExtrema, rows: NDArray[np.in
     return all(np.array_equal(a[at], b[at]) for a, b in zip(part[:3], whole[:3], strict=True))
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("reach_m", [0.0, 4.0, 70.0])
 def test_lines_find_all_that_they_meet_looked_at_and_little_else(
     reach_m: float, monkeypatch: pytest.MonkeyPatch

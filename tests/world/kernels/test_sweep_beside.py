@@ -79,16 +79,9 @@ def test_the_nearest_unknown_patch_is_found_and_none_is_infinitely_far() -> None
         assert unknown_near(FIELD.packed, z, gaps, *args[:-1], 11.0)[0] == 11.0
 
 
-@pytest.mark.first_quick
-@pytest.mark.parametrize(
-    "seed",
-    [
-        1,
-        6,
-        *(pytest.param(k, marks=pytest.mark.slow) for k in (0, 2, 3)),
-        *(pytest.param(k, marks=pytest.mark.nightly) for k in (4, 5, *range(7, 12))),
-    ],
-)
+@pytest.mark.slow
+@pytest.mark.nightly_but("1", "6")
+@pytest.mark.parametrize("seed", range(12))
 def test_columns_find_the_unknown_patch_that_looking_at_every_cell_finds(seed: int) -> None:
     rng = np.random.default_rng([seed, 2])
     rows, cols = (int(n) for n in rng.integers(3, 300, 2))

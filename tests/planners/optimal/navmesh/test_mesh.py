@@ -248,7 +248,7 @@ def test_the_mesh_for_bounds_has_the_straight_way_wherever_the_exact_check_passe
     assert held > 25
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("fineness", [3, 6])
 @pytest.mark.parametrize("world", ["hills", "turned"])
 def test_the_floor_for_bounds_knows_of_what_rises_beside_and_no_more(world: str, fineness: int) -> None:
@@ -399,7 +399,7 @@ def test_nodes_that_are_looked_at_lie_around_the_cells_that_are_wanted(rows: int
                 assert found[j, 0] >= found[j, 1]
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("goes_on", "shear"),
     [((False,) * 4, 0.0), ((True, False, True, False), 0.4), ((True,) * 4, 0.0),

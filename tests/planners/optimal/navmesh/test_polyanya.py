@@ -205,6 +205,7 @@ def turned(place: Floats) -> Place:
     return float(place[0]), float(place[1])
 
 
+@pytest.mark.nightly_but("0-5-plain", "0-0-turned", "12-0-sheared", "12-5-plain", "12-5-turned")
 @pytest.mark.first_quick
 @pytest.mark.parametrize("form", EACH_FORM)
 @pytest.mark.parametrize("holes", [pytest.param(0, marks=pytest.mark.slow), 5])
@@ -246,7 +247,7 @@ def test_ways_are_as_long_as_the_shortest_by_visibility_there_and_back(form: str
     assert exact > 0.8 * compared
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("form", EACH_FORM)
 def test_where_walls_touch_exactly_ways_are_legal_and_no_detours(form: str) -> None:
     """A touching point may be passed or not, but tracks beside it must be found, and no wall may be crossed."""
@@ -354,6 +355,7 @@ def test_a_limit_shuts_out_all_that_is_longer_and_nothing_else() -> None:
     assert compared > 8
 
 
+@pytest.mark.nightly_but("plain-inf", "turned-0.5", "sheared-0.1")
 @pytest.mark.slow
 @pytest.mark.parametrize("slack", [0.1, 0.5, math.inf])
 @pytest.mark.parametrize("form", FORMS)
@@ -386,7 +388,7 @@ def test_a_flood_says_of_no_piece_that_it_is_farther_than_it_is(slack: float, fo
     assert compared > 5
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("block", [pytest.param(1, marks=pytest.mark.slow), 4])
 def test_a_corridor_leaves_out_no_cell_that_a_short_way_crosses(form: str, block: int) -> None:
@@ -426,7 +428,8 @@ def test_a_corridor_leaves_out_no_cell_that_a_short_way_crosses(form: str, block
     assert left_out > 60
 
 
-@pytest.mark.first_quick
+@pytest.mark.nightly_but("0.05-plain", "0.05-sheared", "inf-turned")
+@pytest.mark.slow
 @pytest.mark.parametrize("form", EACH_FORM)
 @pytest.mark.parametrize("slack", [0.05, math.inf])
 def test_a_guide_from_a_mesh_with_more_room_never_changes_the_answer(form: str, slack: float) -> None:

@@ -24,6 +24,7 @@ def track_of(path: Floats) -> float:
     return float(np.hypot(*np.diff(path[:, :2], axis=0).T).sum())
 
 
+@pytest.mark.nightly_but("700.0-12.0")
 @pytest.mark.slow
 @pytest.mark.parametrize(("start_east_m", "climb_deg"), [(600.0, 8.0), (700.0, 8.0), (700.0, 12.0), (830.0, 12.0)])
 def test_bound_of_a_climb_in_front_of_a_ridge_holds_whatever_bounds_came_before(

@@ -53,6 +53,7 @@ CASES: dict[str, Problem] = {
 }
 
 
+@pytest.mark.nightly_but("over a disc", "three in a row", "around, below 120 m", "steeper than it may climb")
 @pytest.mark.first_quick
 @pytest.mark.parametrize("name", CASES)
 def test_the_gap_closes_in_tenths_of_a_second(name: str) -> None:

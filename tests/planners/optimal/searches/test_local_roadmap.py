@@ -35,7 +35,7 @@ def flat(discs: list[tuple[float, float, float]], via: tuple[Via, ...] = (), cle
     return Case("flat", Problem(air, limits, (700.0, 1000.0, 10.05), (1300.0, 1010.0, 10.05), via), ground)
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("family", "seed", "part"),
     [
@@ -62,7 +62,7 @@ def test_a_first_path_is_legal_by_brute_force_and_near_the_best_that_patience_fo
     assert cost_of(case.problem, points) <= (1.0 + part) * cost_of(case.problem, best)
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("gap_m", "clearance_m"), [(1e-3, 0.0), pytest.param(0.5, 0.0, marks=pytest.mark.slow), (0.02, 7.0)]
 )

@@ -71,6 +71,7 @@ def test_ours_are_all_rules_once() -> None:
     assert set(OPTIMISERS) - set(metabox.ours()) == {"po"}  # ABO with α = β = 1
 
 
+@pytest.mark.slow
 def test_clear_paths_are_those_without_a_penalty(tmp_path: Path, python: Path) -> None:
     file = tmp_path / "one.pkl"
     with Worker(python) as worker:
@@ -95,6 +96,7 @@ def test_a_process_that_ends_is_told_with_its_last_words(tmp_path: Path) -> None
         Worker(program)
 
 
+@pytest.mark.slow
 def test_rows_are_places_and_what_was_said_of_the_runs(tmp_path: Path) -> None:
     costs = {"gwo": [[1.0, 2.0], [10.0, 11.0]], "DE": [[3.0, 4.0], [20.0, None]]}
     result: dict[str, Any] = {

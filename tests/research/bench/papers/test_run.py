@@ -110,6 +110,7 @@ def test_a_cluster_without_its_extra_names_the_extra(missions: Path, tmp_path: P
         run([SCENARIO], PAIR, 1, out=tmp_path, missions=missions, cluster="tcp://127.0.0.1:1")
 
 
+@pytest.mark.slow
 def test_a_cluster_gives_the_same_numbers(
     finished: tuple[dict[str, Any], Path], missions: Path, tmp_path: Path, monkeypatch: Any
 ) -> None:
