@@ -30,7 +30,7 @@ RATES = {
     "corner": 12e-6,
     "label": 2.4e-6,
     "interval": 1.1e-6,
-    "section": 6e-8,
+    "section": 2e-8,
     "read": 0.025e-6,
     "pull": 50e-6,
     "sighted": 0.35e-6,

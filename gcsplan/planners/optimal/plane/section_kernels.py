@@ -92,79 +92,110 @@ def lay_sections(
 
 
 @device
-def _take_leg(
-    value: Floats, near: Floats, m: int, n: int, run: float, turn: float, low: float, high: float, slope: Floats,
-    slant: Floats, beyond: Floats,
-) -> None:  # fmt: skip
-    """Lower the values of node n to what a leg of ``run`` metres from node m allows.
+def _lay_leg(legs: Floats, at: int, flat: float, slope_count: int, slant: Floats, beyond: Floats, spec: Floats) -> None:
+    """Set row ``at`` of ``legs``: the planes of a leg between sections ``flat`` metres apart that gets aside by so many
+    steps, and the cost of its level metres."""
+    step = spec[STEP]
+    off = at * step
+    run = math.sqrt(flat * flat + off * off)
+    turn = step * (off + step) / math.sqrt(flat * flat + (off + step) * (off + step))
+    for q in range(slope_count):
+        legs[at, q] = slant[q] * run - beyond[q] * turn
+    legs[at, slope_count] = spec[LEVEL] * run
 
-    The highest plane at the floor stays above a plane that rises less, so that one may be raised to meet it there; and
-    one that rises more, to meet the highest at the ceiling.
+
+@device
+def _highest(before: Floats, leg: Floats, slope: Floats, z: float, q: int, least: int) -> int:
+    """The plane that is highest at altitude z, of those from ``least`` on: found uphill from q, for their heights there
+    are concave in q. If they were not, another plane would be as true a bound."""
+    at, begin = before[q] + leg[q] + slope[q] * z, q
+    while q + 1 < len(slope):
+        to = before[q + 1] + leg[q + 1] + slope[q + 1] * z
+        if to <= at:
+            break
+        q, at = q + 1, to
+    while least < q <= begin:
+        to = before[q - 1] + leg[q - 1] + slope[q - 1] * z
+        if to <= at:
+            break
+        q, at = q - 1, to
+    return q
+
+
+@device
+def _raise_rest(value: Floats, near: Floats, slope: Floats, low: float, high: float, ends: Floats) -> None:
+    """Lower the values (Q,) of a node to what all legs to it allow, and set the nodes before it.
+
+    Of each leg only the planes from the highest at the floor to the highest at the ceiling counted. A plane that rises
+    less may be raised to meet the first at the floor; one that rises more, to meet the last at the ceiling. ``ends``
+    (4, Q): the least height of each plane as the first at the floor, and as the last at the ceiling; and whose.
     """
-    at_low = at_high = -math.inf
-    low_cut = high_cut = 0
-    for q in range(len(slope)):
-        plane = value[q, m] + slant[q] * run - beyond[q] * turn
-        here, there = plane + slope[q] * low, plane + slope[q] * high
-        if here >= at_low:
-            at_low, low_cut = here, q
-        if there > at_high:
-            at_high, high_cut = there, q
-    for q in range(len(slope)):
-        if q < low_cut:
-            cost = at_low - slope[q] * low
-        elif q > high_cut:
-            cost = at_high - slope[q] * high
-        else:
-            cost = value[q, m] + slant[q] * run - beyond[q] * turn
-        if cost < value[q, n]:
-            value[q, n], near[q, n] = cost, m
+    for side in range(2):
+        z, at, of = (low, NONE, -1.0) if side == 0 else (high, NONE, -1.0)
+        for i in range(len(slope)):
+            q = len(slope) - 1 - i if side == 0 else i
+            if at < NONE and at - slope[q] * z < value[q]:
+                value[q], near[q] = at - slope[q] * z, of
+            if ends[side, q] < at:
+                at, of = ends[side, q], ends[2 + side, q]
 
 
-@kernel("i8[] f8[] f8[] f8[] f8[] f8[] f8[] f8[] f8[] f8[] f8[] f8[,] f8[,]")
+@kernel("i8[] f8[] i8[] f8[] f8[] f8[] f8[] f8[] f8[] f8[] f8[] f8[,] f8[,] f8[,] f8[,]")
 def cheapest_chains(
-    first: Int64s, gap: Floats, aside: Floats, low: Floats, high: Floats, left: Floats, slope: Floats, slant: Floats,
-    beyond: Floats, spec: Floats, least: Floats, value: Floats, near: Floats,
+    first: Int64s, gap: Floats, place: Int64s, low: Floats, high: Floats, left: Floats, slope: Floats, slant: Floats,
+    beyond: Floats, spec: Floats, least: Floats, value: Floats, near: Floats, legs: Floats, ends: Floats,
 ) -> int:  # fmt: skip
     """Lower bounds of the cost of chains from the first node to each node, at every altitude; returns the legs counted.
 
-    At node n and altitude z, a chain costs at least ``value[q, n] + slope[q] * z``, for each q; ``near[q, n]`` is the
+    At node n and altitude z, a chain costs at least ``value[n, q] + slope[q] * z``, for each q; ``near[n, q]`` is the
     node before it of the chain that decides. A leg costs no less than each plane (docs/planner.md, "Sections"):
     ``slant[q]`` for a metre of track, ``slope[q]``, rising from q to q, for a metre of climb, less ``beyond[q]`` for
-    each metre of track that rounding may take. Sections k and k + 1 are ``gap[k]`` apart, and the goal is ``left`` (N,)
-    metres away. The caller sets ``value`` at the first node. ``least`` (N,): to work in.
+    each metre of track that rounding may take. Sections k and k + 1 are ``gap[k]`` apart, node n is ``place[n]`` steps
+    aside, and the goal is ``left[n]`` metres away. The caller sets ``value`` at the first node. To work in: ``least``
+    (N,), ``ends`` (4, Q), and ``legs`` (D, Q + 1) for all that may get aside between two sections, in steps.
     """
-    pairs, step, level = 0, spec[STEP], spec[LEVEL]
+    pairs = 0
     least[0] = fewest = 0.0
     for k in range(len(first) - 2):
-        of0, of1, flat = first[k], first[k + 1], gap[k]
+        of0, of1, laid = first[k], first[k + 1], 0
         nearest, next_fewest = of0, math.inf
+        a = b = 0
         for n in range(of1, first[k + 2]):
-            value[:, n], near[:, n] = NONE, -1.0
-            most = spec[MOST] - level * left[n]
-            while nearest + 1 < of1 and abs(aside[nearest + 1] - aside[n]) <= abs(aside[nearest] - aside[n]):
+            value[n, :], near[n, :] = NONE, -1.0
+            ends[:2, :] = NONE
+            most = spec[MOST] - spec[LEVEL] * left[n]
+            while nearest + 1 < of1 and abs(place[nearest + 1] - place[n]) <= abs(place[nearest] - place[n]):
                 nearest += 1
             for side in range(2):
                 m = nearest - side
                 while of0 <= m < of1:
-                    off = abs(aside[m] - aside[n])
-                    run = math.sqrt(flat * flat + off * off)
-                    if fewest + level * run > most:
+                    off = abs(place[m] - place[n])
+                    while laid <= off:
+                        _lay_leg(legs, laid, gap[k], len(slope), slant, beyond, spec)
+                        laid += 1
+                    level = legs[off, len(slope)]
+                    if fewest + level > most:
                         break
-                    if least[m] + level * run <= most:
+                    if least[m] + level <= most:
                         pairs += 1
-                        turn = step * (off + step) / math.sqrt(flat * flat + (off + step) * (off + step))
-                        q = 0
-                        while q < len(slope) and value[q, m] + slant[q] * run - beyond[q] * turn >= value[q, n]:
-                            q += 1
-                        if q < len(slope):
-                            _take_leg(value, near, m, n, run, turn, low[n], high[n], slope, slant, beyond)
+                        a = _highest(value[m], legs[off], slope, low[n], a, 0)
+                        b = _highest(value[m], legs[off], slope, high[n], max(a, b), a)
+                        for q in range(a, b + 1):
+                            if value[m, q] + legs[off, q] < value[n, q]:
+                                value[n, q], near[n, q] = value[m, q] + legs[off, q], m
+                        at_low = value[m, a] + legs[off, a] + slope[a] * low[n]
+                        at_high = value[m, b] + legs[off, b] + slope[b] * high[n]
+                        if at_low < ends[0, a]:
+                            ends[0, a], ends[2, a] = at_low, m
+                        if at_high < ends[1, b]:
+                            ends[1, b], ends[3, b] = at_high, m
                     m += 1 - 2 * side
+            _raise_rest(value[n], near[n], slope, low[n], high[n], ends)
             least[n] = -math.inf
             for q in range(len(slope)):
-                least[n] = max(least[n], value[q, n] + min(slope[q] * low[n], slope[q] * high[n]))
+                least[n] = max(least[n], value[n, q] + min(slope[q] * low[n], slope[q] * high[n]))
             if least[n] > most:
-                value[:, n], least[n] = NONE, math.inf
+                value[n, :], least[n] = NONE, math.inf
             next_fewest = min(next_fewest, least[n])
         fewest = next_fewest
     return pairs

@@ -57,7 +57,7 @@ FINER = 2
 
 
 class Bound(Search):
-    """When a path is known: with rising effort, and after a better path again with the effort so far.
+    """When a path is known, without a maximum AGL: with rising effort, and after a better path again with the effort so far.
 
     Remembers which efforts were chosen, and whether altitude intervals are used.
     """
@@ -89,13 +89,12 @@ class Bound(Search):
             return PLAIN
         if BY_INTERVALS not in self._chosen and incumbent.climbs:
             return BY_INTERVALS
-        # Under a maximum AGL it takes twice as long as all others together, for a tenth or two of the gap.
-        far = incumbent.gap > REFINED_GAP * incumbent.most_gap and self.problem.limits.max_agl_m is None
+        far = incumbent.gap > REFINED_GAP * incumbent.most_gap
         return REFINED if REFINED not in self._chosen and far else None
 
     def applies(self) -> bool:
-        """Whether a path is known."""
-        return self.incumbent.best is not None
+        """Whether a path is known, and no maximum AGL: `sections` has higher bounds there."""
+        return self.incumbent.best is not None and self.problem.limits.max_agl_m is None
 
     def is_open(self) -> bool:
         """Whether an effort is left."""

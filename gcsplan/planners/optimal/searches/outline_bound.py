@@ -20,8 +20,10 @@ class OutlineBound(Search):
     NAME, IMPROVES, SHARE, AGAIN = "outline_bound", "paths, bounds", 0.9, True
 
     def applies(self) -> bool:
-        """Whether there are zones that can be passed over, and not under."""
-        return self.incumbent.best is not None and self._zones() > 0
+        """Whether there are zones that can be passed over, and not under; under a maximum AGL `sections` has higher
+        bounds."""
+        known = self.incumbent.best is not None and self.problem.limits.max_agl_m is None
+        return known and self._zones() > 0
 
     def size(self) -> Size:
         """By the number of such zones."""

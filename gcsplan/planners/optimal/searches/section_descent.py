@@ -9,10 +9,14 @@ DESCENT_S = 0.1
 
 
 class SectionDescent(Search):
-    """When a path is known, and again after a better one; under a maximum AGL beyond a gap of `BAND_FAR`. Remembers
-    nothing."""
+    """When a path is known, and again after a better one; under a maximum AGL once, beyond a gap of `BAND_FAR`.
+    Remembers nothing."""
 
     NAME, IMPROVES, SHARE, AGAIN = "section_descent", "paths", 0.1, True
+
+    def is_open(self) -> bool:
+        """Under a maximum AGL once; else also after a better path."""
+        return (self.seen is None or self.problem.limits.max_agl_m is None) and super().is_open()
 
     def applies(self) -> bool:
         """Whether a path is known, and under a maximum AGL whether it may be weak."""

@@ -30,13 +30,15 @@ SPACING_M, LEAST_SECTIONS = 240.0, 8
 """Metres between the first sections, but at least so many of them on the straight way."""
 LOOKS = ((1e6, 0), (4e6, 0), (6e6, 1), (1.2e7, 2))
 """Legs between nodes that are looked at, at most, and how often the spacing was halved."""
+SHARES = (0.8, 0.15, 0.25, 0.15)
+"""The part of the gap that each of them closes, on average."""
 WORTH_MORE = 0.03
 """Part of the gap that a look must close for the next one to follow."""
 NEARER_PATH = 0.7
 """Part of the gap it left, to which a better path must have closed it for another run."""
 LEAST_STEP, MOST_STEP = 1.0 / 40.0, 1.0
 """Least and most metres between nodes, as parts of the spacing."""
-LEG_S = 3e-8
+LEG_S = 1e-8
 """Counted seconds of a leg between nodes."""
 LEVEL_SLOPES, STEEPEST = (0.03, 0.07, 0.12, 0.18, 0.26, 0.36, 0.5), 1.0
 """Prices of a metre of climb in metres of track, and the slope from which on a climb limit does not count."""
@@ -84,46 +86,60 @@ def _side(problem: Problem, limit: float) -> tuple[Floats, Floats, Floats]:
 
 
 class SectionChains(Search):
-    """Under a maximum AGL, when a path is known; after a much better one again."""
+    """Under a maximum AGL, when a path is known: one look after another, while they close the gap; and one look more
+    after a much better path. Remembers the last look, which the next one begins with."""
 
-    NAME, IMPROVES, SHARE, AGAIN = "sections", "paths, bounds", 0.8, True
+    NAME, IMPROVES, SHARE = "sections", "paths, bounds", 0.8
 
     def __init__(self, work: Workspace) -> None:
         super().__init__(work)
+        self._next, self._goes_on = 0, True
+        """The number of the next look, and whether the last one gained enough for it."""
         self._left = math.inf
-        """The gap that the last run left."""
+        """The gap that the last look left, or met if there was none."""
+        self._looked: _Look | None = None
+
+    @property
+    def share(self) -> float:
+        """By the number of the look."""
+        return SHARES[self._next]
 
     def applies(self) -> bool:
         """Under a maximum AGL, when a path is known."""
-        if self.problem.limits.max_agl_m is None or self.incumbent.best is None:
-            return False
-        return self.incumbent.gap < NEARER_PATH * self._left
+        return self.problem.limits.max_agl_m is not None and self.incumbent.best is not None
+
+    def is_open(self) -> bool:
+        """Whether another look is worth it, or a path much better than at the last one is known."""
+        return self.applies() and (self._goes_on or self.incumbent.gap < NEARER_PATH * self._left)
+
+    def choose(self) -> None:
+        """Note the gap: after a look that is refused, or cannot be laid out, a much better path must be known."""
+        super().choose()
+        self._goes_on, self._left = False, self.incumbent.gap
 
     def size(self) -> Size:
-        """The first look; the next ones follow only while they close the gap."""
-        return LOOKS[0][0] * LEG_S, self.work.plane.size(1.0)[1] + LOOKS[-1][0] / 100.0 * NODE_MB
+        """The legs between nodes of the next look."""
+        pairs = LOOKS[self._next][0]
+        return pairs * LEG_S, self.work.plane.size(1.0)[1] + pairs / 100.0 * NODE_MB
 
     def run(self) -> None:
-        """Raise the bound, and try the cheapest chains as tracks, with more nodes each time."""
-        plane, incumbent = self.work.plane, self.incumbent
-        if incumbent.best is None or not plane.legs or not plane.reach_longest():
+        """Raise the bound, and try the cheapest chain as a track."""
+        plane, incumbent, gap = self.work.plane, self.incumbent, self.incumbent.cost - self.incumbent.bound
+        planes, (pairs, halvings) = Planes.of(self.problem), LOOKS[self._next]
+        if not plane.legs or not plane.reach_longest():
             return
-        planes, looked = Planes.of(self.problem), None
-        for pairs, halvings in LOOKS:
-            gap = incumbent.cost - incumbent.bound
-            sections = self._laid_out(planes, looked, pairs, halvings)
-            if sections is None:
-                break
-            halved = looked is not None and len(sections.lines) > len(looked.sections.lines)
-            looked = _Look(planes, sections, incumbent.cost)
-            incumbent.budget.spend("section", looked.pairs)
-            if math.isfinite(looked.bound):
-                self._try(sections, looked.chain())
-            incumbent.raise_bound(looked.bound)
-            little = gap - (incumbent.cost - incumbent.bound) < WORTH_MORE * gap
-            if not incumbent.goes_on() or (halved and little):
-                break
-        self._left = incumbent.gap
+        sections, before = self._laid_out(planes, self._looked, pairs, halvings), self._looked
+        if sections is None:
+            return
+        looked = self._looked = _Look(planes, sections, incumbent.cost)
+        incumbent.budget.spend("section", looked.pairs)
+        if math.isfinite(looked.bound):
+            self._try(sections, looked.chain())
+        incumbent.raise_bound(looked.bound)
+        halved = before is not None and len(sections.lines) > len(before.sections.lines)
+        little = gap - (incumbent.cost - incumbent.bound) < WORTH_MORE * gap
+        self._goes_on = self._next + 1 < len(LOOKS) and not (halved and little)
+        self._next, self._left = min(self._next + 1, len(LOOKS) - 1), incumbent.gap
 
     def _laid_out(self, planes: Planes, looked: _Look | None, pairs: float, halvings: int) -> Sections | None:
         """The nodes of the next look, over what the last one left; None if they are too far apart, or lie over unknown
@@ -175,49 +191,52 @@ class _Look:
         self.most = cost + self.less
         self.value, self.near, self.pairs = self._swept(back=False)
         low, high = sections.low[-1], sections.high[-1]
-        ends = self.value[:, -1] + np.minimum(planes.slope * low, planes.slope * high)
-        self.bound = float(ends.max()) - self.less if self.value[0, -1] < NONE else math.inf
+        ends = self.value[-1] + np.minimum(planes.slope * low, planes.slope * high)
+        self.bound = float(ends.max()) - self.less if self.value[-1, 0] < NONE else math.inf
 
     def _swept(self, *, back: bool) -> tuple[Floats, Floats, int]:
         """`cheapest_chains` to each node, or from it to the last one: values, nodes before, and legs."""
         s, planes = self.sections, self.planes
         turn = slice(None, None, -1 if back else 1)
         first = (len(s.x) - s.first[turn]) if back else s.first
-        nodes = (s.aside, s.low, s.high, s.away if back else s.left)
+        place = np.rint(s.aside / s.step_m).astype(np.int64)
+        nodes = (place, s.low, s.high, s.away if back else s.left)
         slope = -planes.slope if back else planes.slope
-        value, near = np.full((len(slope), len(s.x)), NONE), np.full((len(slope), len(s.x)), -1.0)
-        aside, low, high, left, gap, slope, slant, beyond = (
+        place, low, high, left, gap, slope, slant, beyond = (
             np.ascontiguousarray(v[turn]) for v in (*nodes, s.gap, slope, planes.slant, planes.beyond)
         )
-        value[:, 0] = -slope * low[0]
-        spec, least = np.array([s.step_m, planes.level, self.most]), np.empty(len(s.x))
+        value, near = np.full((len(place), len(slope)), NONE), np.full((len(place), len(slope)), -1.0)
+        value[0] = -slope * low[0]
+        spec = np.array([s.step_m, planes.level, self.most])
+        work = np.empty((int(np.ptp(place)) + 1, len(slope) + 1)), np.empty((4, len(slope)))
         pairs = cheapest_chains(
-            np.ascontiguousarray(first), gap, aside, low, high, left, slope, slant, beyond, spec, least, value, near
-        )
+            np.ascontiguousarray(first), gap, place, low, high, left, slope, slant, beyond, spec, np.empty(len(place)),
+            value, near, *work,
+        )  # fmt: skip
         return value[turn, turn], near, pairs
 
     def chain(self) -> Int64s:
         """The nodes of the chain that decides the bound."""
         s, planes = self.sections, self.planes
         nodes = [len(s.x) - 1]
-        q = int((self.value[:, -1] + planes.slope * s.low[-1]).argmax())
-        while (m := int(self.near[q, nodes[-1]])) >= 0:
+        q = int((self.value[-1] + planes.slope * s.low[-1]).argmax())
+        while (m := int(self.near[nodes[-1], q])) >= 0:
             n = nodes[-1]
             run = math.hypot(s.x[n] - s.x[m], s.y[n] - s.y[m])
-            plane = self.value[:, m] + planes.slant * run
+            plane = self.value[m] + planes.slant * run
             q = int(np.clip(q, *((plane + planes.slope * at).argmax() for at in (s.low[n], s.high[n]))))
             nodes.append(m)
         return np.array(nodes[::-1], np.int64)
 
     def nodes_left(self, cost: float) -> Bools:
         """(N,) the nodes that a rounded chain of a path cheaper than ``cost`` may pass."""
-        s, slope = self.sections, self.planes.slope[:, None]
+        s, slope = self.sections, self.planes.slope
         back = self._swept(back=True)[0]
-        through = (self.value + back).max(axis=0)
+        through = (self.value + back).max(axis=1)
         every = np.arange(len(s.x))
-        for at, rising in ((s.low, 1.0), (s.high, -1.0)):
+        for at, rising in ((s.low[:, None], 1.0), (s.high[:, None], -1.0)):
             to, of = self.value + slope * at, back - slope * at
-            i, j = to.argmax(axis=0), of.argmax(axis=0)
-            ends = rising * (slope[i, 0] - slope[j, 0]) >= 0.0
-            through = np.where(ends, to[i, every] + of[j, every], through)
+            i, j = to.argmax(axis=1), of.argmax(axis=1)
+            ends = rising * (slope[i] - slope[j]) >= 0.0
+            through = np.where(ends, to[every, i] + of[every, j], through)
         return np.asarray(through <= cost + self.less)

@@ -76,9 +76,10 @@ def chains(seed: int, *, beyond: float) -> tuple[float, float, bool]:
     first = np.array([0, 1, 5, 9, 12, 13], np.int64)
     n, gap = 13, np.full(4, 100.0)
     section = np.repeat(np.arange(5), np.diff(first))
-    aside = np.zeros(n)
+    place, step = np.zeros(n, np.int64), 2.0
     for a, b in itertools.pairwise(first.tolist()):
-        aside[a:b] = np.sort(rng.uniform(-60.0, 60.0, b - a)) if b - a > 1 else 0.0
+        place[a:b] = np.sort(rng.integers(-30, 31, b - a)) if b - a > 1 else 0
+    aside = step * place
     low = np.round(rng.uniform(0.0, 30.0, n))
     high = low + np.round(rng.uniform(0.0, 20.0, n))
     high[[0, -1]] = low[[0, -1]]
@@ -89,11 +90,11 @@ def chains(seed: int, *, beyond: float) -> tuple[float, float, bool]:
     half = np.append(np.linspace(0.0, sine, 4), sine + over[4:])
     flat = np.where(over > 0.0, math.sqrt(1.0 - sine**2) - k * over, np.sqrt(1.0 - np.minimum(half, sine) ** 2))
     slope, slant, more = (np.append(-v[:0:-1] if v is half else v[:0:-1], v) for v in (half, flat, beyond * k * over))
-    value, near = np.full((len(slope), n), NONE), np.full((len(slope), n), -1.0)
-    value[:, 0] = -slope * low[0]
-    spec = np.array([2.0, 1.0, most])
-    cheapest_chains(first, gap, aside, low, high, left, slope, slant, more, spec, np.empty(n), value, near)
-    bound = float((value[:, -1] + slope * low[-1]).max())
+    value, near = np.full((n, len(slope)), NONE), np.full((n, len(slope)), -1.0)
+    value[0] = -slope * low[0]
+    spec, work = np.array([step, 1.0, most]), (np.empty((61, len(slope) + 1)), np.empty((4, len(slope))))
+    cheapest_chains(first, gap, place, low, high, left, slope, slant, more, spec, np.empty(n), value, near, *work)
+    bound = float((value[-1] + slope * low[-1]).max())
 
     altitudes = np.arange(0.0, 51.0, 0.5)
     costs = np.where(np.abs(altitudes - low[0]) < 0.3, 0.0, math.inf)
@@ -106,7 +107,7 @@ def chains(seed: int, *, beyond: float) -> tuple[float, float, bool]:
             leg = np.hypot(np.maximum(run, rise / k), rise)
             best = np.minimum(best, (of[i][:, None] + leg).min(axis=0))
         of[j] = np.where((altitudes >= low[j] - 0.25) & (altitudes <= high[j] + 0.25), best, math.inf)
-    return bound, float(of[n - 1].min()), bool((value[0] >= NONE).any())
+    return bound, float(of[n - 1].min()), bool((value[:, 0] >= NONE).any())
 
 
 @pytest.mark.parametrize("seed", range(30))

@@ -113,4 +113,4 @@ def test_efforts_that_cannot_help_are_left_out() -> None:
     assert efforts(with_a_path(1500.0, 1100.0, Limits(10.0))) == [SHARES[PLAIN], SHARES[REFINED]]
     assert efforts(with_a_path(1100.1, 1100.0, Limits(10.0))) == [SHARES[PLAIN]]  # the gap is as small as wanted
     band = Limits(10.0, max_agl_m=100.0, max_climb_deg=10.0)
-    assert efforts(with_a_path(1500.0, 1100.0, band)) == [SHARES[PLAIN], SHARES[BY_INTERVALS]]
+    assert efforts(with_a_path(1500.0, 1100.0, band)) == []

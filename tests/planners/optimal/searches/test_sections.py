@@ -57,6 +57,14 @@ def found(problem: Problem) -> Workspace:
     return work
 
 
+def look(work: Workspace) -> None:
+    """Run all looks at the sections."""
+    search = SectionChains(work)
+    while search.is_open():
+        search.choose()
+        search.run()
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("errors", [pytest.param(False, marks=pytest.mark.nightly), True])
 @pytest.mark.parametrize(("objective", "climb_deg"), [("length", 90.0), ("length", 12.0), ("energy", 20.0)])
@@ -69,7 +77,7 @@ def test_a_path_drawn_together_costs_no_less_than_the_bound(
         improve(work, without=("bound", "cap_pairs", "bound_corridor", "outline_bound"))
         incumbent = work.incumbent
         assert incumbent.best is not None
-        SectionChains(work).run()
+        look(work)
         points = incumbent.best
         for _ in range(3):
             points, _ = tightened(problem, points)
