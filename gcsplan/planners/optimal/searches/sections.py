@@ -32,6 +32,8 @@ LOOKS = ((1e6, 0), (4e6, 0), (6e6, 1), (1.2e7, 2))
 """Legs between nodes that are looked at, at most, and how often the spacing was halved."""
 SHARES = (0.8, 0.15, 0.25, 0.15)
 """The part of the gap that each of them closes, on average."""
+NEAR = 1.0 / 12.0
+"""Metres between nodes, as a part of the spacing, up to which a look with more nodes on the same lines is left out."""
 WORTH_MORE = 0.03
 """Part of the gap that a look must close for the next one to follow."""
 NEARER_PATH = 0.7
@@ -138,8 +140,12 @@ class SectionChains(Search):
         incumbent.raise_bound(looked.bound)
         halved = before is not None and len(sections.lines) > len(before.sections.lines)
         little = gap - (incumbent.cost - incumbent.bound) < WORTH_MORE * gap
-        self._goes_on = self._next + 1 < len(LOOKS) and not (halved and little)
-        self._next, self._left = min(self._next + 1, len(LOOKS) - 1), incumbent.gap
+        after = self._next + 1
+        near = sections.step_m <= NEAR * float(sections.gap.max())
+        if near and after < len(LOOKS) and LOOKS[after][1] == halvings:
+            after += 1
+        self._goes_on = after < len(LOOKS) and not (halved and little)
+        self._next, self._left = min(after, len(LOOKS) - 1), incumbent.gap
 
     def _laid_out(self, planes: Planes, looked: _Look | None, pairs: float, halvings: int) -> Sections | None:
         """The nodes of the next look, over what the last one left; None if they are too far apart, or lie over unknown
