@@ -57,7 +57,8 @@ FINER = 2
 
 
 class Bound(Search):
-    """When a path is known, without a maximum AGL: with rising effort, and after a better path again with the effort so far.
+    """When a path is known, unless there is a maximum AGL: with rising effort, and after a better path again with the
+    effort so far.
 
     Remembers which efforts were chosen, and whether altitude intervals are used.
     """
@@ -93,7 +94,7 @@ class Bound(Search):
         return REFINED if REFINED not in self._chosen and far else None
 
     def applies(self) -> bool:
-        """Whether a path is known, and no maximum AGL: `sections` has higher bounds there."""
+        """Whether a path is known, and no maximum AGL, under which `sections` has higher bounds."""
         return self.incumbent.best is not None and self.problem.limits.max_agl_m is None
 
     def is_open(self) -> bool:
