@@ -38,14 +38,7 @@ ROUNDS, WORTHWHILE = 4, 0.01
 def ranges(mesh: Mesh, top_m: float, cells: Int64s) -> tuple[Floats, Floats]:
     """(K,) the lowest and the highest altitude, at most ``top_m``, that can be flown at in each of ``cells`` (K,);
     lowest above highest where there is none. ``mesh`` must be for bounds and as fine as its plane."""
-    plane, (rows, cols) = mesh.plane, mesh.excess.shape
     low, high = mesh.lowest(cells), np.full(len(cells), top_m)
-    limits = plane.problem.bound_limits
-    if limits.max_agl_m is not None:
-        ground = plane.grounds[1][mesh.row : mesh.row + rows, mesh.col : mesh.col + cols]
-        pairs = np.maximum(ground[:-1], ground[1:])
-        most = np.maximum(pairs[:, :-1], pairs[:, 1:]).ravel()[cells]
-        high = np.fmin(high, most + (limits.max_agl_m - limits.altitude_error_m + plane.fit.spare_m))
     count, lows, highs = intervals(mesh, cells, low, high, 0.0)
     there = np.arange(MOST_INTERVALS) < count[:, None]
     return np.where(there, lows, np.inf).min(axis=1), np.where(there, highs, -np.inf).max(axis=1)

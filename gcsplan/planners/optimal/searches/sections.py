@@ -205,11 +205,11 @@ class _Look:
         s, planes = self.sections, self.planes
         turn = slice(None, None, -1 if back else 1)
         first = (len(s.x) - s.first[turn]) if back else s.first
-        place = np.rint(s.aside / s.step_m).astype(np.int64)
-        nodes = (place, s.low, s.high, s.away if back else s.left)
+        place = np.rint(s.aside[turn] / s.step_m).astype(np.int64)
         slope = -planes.slope if back else planes.slope
-        place, low, high, left, gap, slope, slant, beyond = (
-            np.ascontiguousarray(v[turn]) for v in (*nodes, s.gap, slope, planes.slant, planes.beyond)
+        low, high, left, gap, slope, slant, beyond = (
+            np.ascontiguousarray(v[turn])
+            for v in (s.low, s.high, s.away if back else s.left, s.gap, slope, planes.slant, planes.beyond)
         )
         value, near = np.full((len(place), len(slope)), NONE), np.full((len(place), len(slope)), -1.0)
         value[0] = -slope * low[0]
