@@ -30,9 +30,9 @@ SPACING_M, LEAST_SECTIONS = 240.0, 8
 """Metres between the first sections, but at least so many of them on the straight way."""
 LOOKS = ((1e6, 0), (4e6, 0), (6e6, 1), (1.2e7, 2))
 """Legs between nodes that are looked at, at most, and how often the spacing was halved."""
-SHARES = (0.8, 0.15, 0.25, 0.15)
+LOOK_SHARES = (0.8, 0.15, 0.25, 0.15)
 """The part of the gap that each of them closes, on average."""
-NEAR = 1.0 / 12.0
+NEAR_NODES = 1.0 / 12.0
 """Metres between nodes, as a part of the spacing, up to which a look with more nodes on the same lines is left out."""
 WORTH_MORE = 0.03
 """Part of the gap that a look must close for the next one to follow."""
@@ -104,7 +104,7 @@ class SectionChains(Search):
     @property
     def share(self) -> float:
         """By the number of the look."""
-        return SHARES[self._next]
+        return LOOK_SHARES[self._next]
 
     def applies(self) -> bool:
         """Under a maximum AGL, when a path is known."""
@@ -141,7 +141,7 @@ class SectionChains(Search):
         halved = before is not None and len(sections.lines) > len(before.sections.lines)
         little = gap - (incumbent.cost - incumbent.bound) < WORTH_MORE * gap
         after = self._next + 1
-        near = sections.step_m <= NEAR * float(sections.gap.max())
+        near = sections.step_m <= NEAR_NODES * float(sections.gap.max())
         if near and after < len(LOOKS) and LOOKS[after][1] == halvings:
             after += 1
         self._goes_on = after < len(LOOKS) and not (halved and little)
