@@ -61,7 +61,7 @@ class BetterPath:
 
     ``lat_deg``, ``lon_deg``, ``amsl_m``: its way points, (N,) each. Its legs keep the limits with the planner's
     margins, but the mission made of it is not judged: only the `Plan` that is returned is proved. ``cost`` and
-    ``lower_bound`` are metres, or joules if the objective is energy; ``elapsed_s`` counts from the call.
+    ``lower_bound`` are metres, joules or seconds by the objective; ``elapsed_s`` counts from the call.
     """
 
     vehicle: str

@@ -78,8 +78,8 @@ VIOLATION = an_object(
 FORMS: dict[str, tuple[str, dict[str, Any], dict[str, Any]]] = {
     "plan": (
         "summary.json, upload.json and plan --json",
-        {"name": TEXT, "gcsplan": TEXT, "planner": TEXT, "objective": {"enum": ["length", "energy"]}, "seed": COUNT,
-         "inputs": INPUTS, "vehicles": listed(VEHICLE_PLAN), "fleet": FLEET},
+        {"name": TEXT, "gcsplan": TEXT, "planner": TEXT, "objective": {"enum": ["length", "energy", "time"]},
+         "seed": COUNT, "inputs": INPUTS, "vehicles": listed(VEHICLE_PLAN), "fleet": FLEET},
         {**NOTES, "left_out": listed(an_object({"name": TEXT, "reason": TEXT, "message": TEXT}))},
     ),
     "check": (

@@ -80,7 +80,7 @@ class PlannerRequest:
     """The planner and its settings; ``extras`` are the keys that only some planners have."""
 
     name: str = "optimal"
-    objective: Literal["length", "energy"] = "length"
+    objective: Literal["length", "energy", "time"] = "length"
     seed: int = 1
     gap_percent: float = 0.1
     budget_s: float = 10.0

@@ -57,7 +57,7 @@ FORM: tuple[FormKey, ...] = (
     FormKey("vehicle", FIRST_VEHICLE, VehicleKeys, "climb_m_s", "Fastest climb rate", "climb_rate"),
     FormKey("vehicle", FIRST_VEHICLE, VehicleKeys, "descent_m_s", "Fastest descent rate", "climb_rate"),
     FormKey("vehicle", FIRST_VEHICLE, VehicleKeys, "turn_radius_m", "Turn radius of a fixed wing", "distance"),
-    FormKey("planner", "planner", PlannerKeys, "objective", "Shortest or least energy"),
+    FormKey("planner", "planner", PlannerKeys, "objective", "Shortest, least energy or fastest"),
     FormKey("planner", "planner", PlannerKeys, "gap_percent", "Gap at which planning stops"),
     FormKey("planner", "planner", PlannerKeys, "budget_s", "Longest search"),
 )

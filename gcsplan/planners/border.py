@@ -55,7 +55,7 @@ def goes_on(problem: Problem) -> bool:
 
 
 def exit_cost(problem: Problem) -> float:
-    """The least cost of a path that leaves the surface where the terrain goes on, metres or joules by the objective;
+    """The least cost of a path that leaves the surface where the terrain goes on, in the objective's unit;
     inf if `goes_on` is false."""
     if not goes_on(problem):
         return math.inf
@@ -68,10 +68,7 @@ def exit_cost(problem: Problem) -> float:
     track_m = float(legs.sum()) + max(more_m - 4.0 * bow_m, 0.0)
     heights = [problem.start[2], *(v.amsl_m for v in problem.via if v.amsl_m is not None), problem.goal[2]]
     rise_m = sum(abs(b - a) for a, b in pairwise(heights))
-    cost = math.hypot(track_m, rise_m)
-    if problem.objective == "energy":
-        cost = problem.horizontal_j_per_m * track_m + problem.vertical_j_per_m * rise_m
-    return float(cost * (1.0 - 1e-9))  # arithmetic is rounded
+    return float(problem.least_cost(track_m, rise_m) * (1.0 - 1e-9))  # arithmetic is rounded
 
 
 def within_m(problem: Problem) -> float:
@@ -93,10 +90,11 @@ def margin_for(problem: Problem, cost: float) -> float:
         return math.inf
     legs = [math.dist(a, b) for a, b in pairwise(terminals_of(problem))]
     straight_m, track_m = sum(legs), cost
-    if problem.objective == "energy":
-        if problem.horizontal_j_per_m <= 0.0:
+    if problem.rates is not None:
+        level, _ = problem.rates
+        if level <= 0.0:
             return math.inf
-        track_m = cost / problem.horizontal_j_per_m
+        track_m = cost / level
     off_m = 0.5 * math.sqrt(max(track_m**2 - straight_m**2, 0.0))
     return off_m + 2.0 * _reach_m(problem.airspace, problem.limits) + 1.0
 

@@ -19,7 +19,10 @@ from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.geometry.limits import Limits
 from gcsplan.world.geometry.path import Path
 
-Objective = Literal["length", "energy"]
+Objective = Literal["length", "energy", "time"]
+
+UNIT_OF: Mapping[Objective, str] = MappingProxyType({"length": "m", "energy": "J", "time": "s"})
+"""The unit of each objective's costs and bounds."""
 
 ENDS_M = 25.0
 """Metres by which floors and ceilings over a line, which are conservative, are too strict in rough ground at worst. So
@@ -76,6 +79,9 @@ class Problem:
     `bound_limits` and `for_bounds`. ``rounding_m``: how far ends and vias of the paths that a bound speaks of may lie
     beside the problem's own, in the plane and in altitude. See docs/concepts/certificates.md.
 
+    ``speed_m_s`` over ground and the rates of climb and descent are the fastest, and count for the objective ``time``
+    alone.
+
     Metres only: a planner never sees a degree. ``options`` are keys that only some planners know:
     the swarms' ``encoding``, ``cost``, ``points``, ``population``, ``iterations``, ``evaluations``, ``parameters``.
 
@@ -93,6 +99,9 @@ class Problem:
     objective: Objective = "length"
     vertical_j_per_m: float = 120.0
     horizontal_j_per_m: float = 100.0
+    speed_m_s: float = 15.0
+    climb_m_s: float = 2.5
+    descent_m_s: float = 1.5
     turn_radius_m: float = 0.0
     seed: int = 1
     gap_percent: float = 0.1
@@ -119,8 +128,9 @@ class Problem:
         """The limits that bounds and proofs assume: the check's limits, with less track error by `_aside_m`.
 
         So a path that begins a little beside the start is one from the start itself, with a connector that is legal.
+        For the objective ``time`` they have the slopes of `at_full_speed`.
         """
-        checked = self._checked
+        checked = self.at_full_speed(self._checked)
         return replace(checked, track_error_m=max(checked.track_error_m - self._aside_m, 0.0))
 
     @property
@@ -144,6 +154,24 @@ class Problem:
         )
         return 0.0 if keep and not self.via else flat_m
 
+    def at_full_speed(self, limits: Limits) -> Limits:
+        """``limits``; for the objective ``time`` with no slope on which a rate of climb or descent takes speed away.
+        A bound of paths within them holds of all: docs/concepts/bound.md#time."""
+        if self.objective != "time":
+            return limits
+        up, down = (math.degrees(math.atan(rate / self.speed_m_s)) for rate in (self.climb_m_s, self.descent_m_s))
+        return replace(
+            limits, max_climb_deg=min(limits.max_climb_deg, up), max_descent_deg=min(limits.max_descent_deg, down)
+        )
+
+    @property
+    def rates(self) -> tuple[float, float] | None:
+        """The costs of a metre of track and of a metre climbed or descended besides, whose sum no path undercuts; None
+        for the objective ``length``, which no such sum is near to. A climb at full speed costs nothing besides."""
+        if self.objective == "time":
+            return 1.0 / self.speed_m_s, 0.0
+        return (self.horizontal_j_per_m, self.vertical_j_per_m) if self.objective == "energy" else None
+
     @property
     def for_bounds(self) -> Problem:
         """The same problem with the limits that bounds and proofs assume, for searches that serve them alone."""
@@ -154,9 +182,7 @@ class Problem:
         """The most that connectors to the problem's own ends and vias add to the cost of a path: one at each end, two
         at each via. A bound of paths between the exact ends, less this, is one of all paths."""
         flat, rise = self.rounding_m
-        each = math.hypot(flat, rise)
-        if self.objective == "energy":
-            each = self.horizontal_j_per_m * flat + self.vertical_j_per_m * rise
+        each = max(float(self.slope_costs(flat, up)) for up in (rise, -rise))
         return (2 + 2 * len(self.via)) * each
 
     def rounding(self) -> EndRounding:
@@ -166,13 +192,42 @@ class Problem:
     def leg_costs(self, start: Floats, end: Floats) -> Floats:
         """(...) costs of straight legs between points (..., 3); `cost` of a path is their sum."""
         d = end - start
-        flat = np.hypot(d[..., 0], d[..., 1])
+        return self.slope_costs(np.hypot(d[..., 0], d[..., 1]), d[..., 2])
+
+    def slope_costs(self, run_m: Floats | float, rise_m: Floats | float) -> Floats:
+        """(...) costs of straight legs by their metres of track and the metres that they rise, below 0 where they
+        descend. A leg costs no more than any other way between its ends, because costs grow in proportion to a leg and
+        are convex in both numbers."""
         if self.objective == "energy":
-            return np.asarray(self.horizontal_j_per_m * flat + self.vertical_j_per_m * np.abs(d[..., 2]))
-        return np.asarray(np.hypot(flat, d[..., 2]))
+            return np.asarray(self.horizontal_j_per_m * run_m + self.vertical_j_per_m * np.abs(rise_m))
+        if self.objective == "time":
+            rise_s = np.maximum(np.divide(rise_m, self.climb_m_s), np.divide(rise_m, -self.descent_m_s))
+            return np.maximum(np.divide(run_m, self.speed_m_s), rise_s)
+        return np.asarray(np.hypot(run_m, rise_m))
+
+    def least_cost(self, track_m: float, vertical_m: float) -> float:
+        """The least cost of a path from start to goal whose track is at least so long, and which climbs and descends at
+        least so many metres in all. For the objective ``time`` it climbs and descends one after the other, and flies
+        its track meanwhile."""
+        if self.objective != "time":
+            return float(self.slope_costs(track_m, vertical_m))
+        rise_m = self.goal[2] - self.start[2]
+        up_m, down_m = (0.5 * max(vertical_m + rise, 0.0) for rise in (rise_m, -rise_m))
+        return max(track_m / self.speed_m_s, up_m / self.climb_m_s + down_m / self.descent_m_s)
+
+    def most_climbed_m(self, cost: float, track_m: float) -> float:
+        """The most metres that such a path climbs and descends in all if it costs no more than ``cost``."""
+        if self.objective == "length":
+            return math.sqrt(max(cost**2 - track_m**2, 0.0))
+        if self.objective == "energy":
+            level, climbing = self.horizontal_j_per_m * track_m, self.vertical_j_per_m
+        else:
+            up, down = 0.5 / self.climb_m_s, 0.5 / self.descent_m_s
+            level, climbing = (self.goal[2] - self.start[2]) * (up - down), up + down
+        return (cost - level) / climbing if climbing else math.inf
 
     def cost_through(self, points: Floats) -> float:
-        """Metres or joules of the path through ``points`` (N, 3)."""
+        """Metres, joules or seconds of the path through ``points`` (N, 3)."""
         return float(self.leg_costs(points[:-1], points[1:]).sum())
 
     def legal(self, start: Floats, end: Floats) -> Bools:
@@ -194,10 +249,10 @@ class Problem:
         return self.airspace.floor_amsl(east_m, north_m, self.limits)
 
     def cost(self, path: Path) -> float:
-        """Metres or joules of ``path``, by the objective."""
+        """Metres, joules or seconds of ``path``, by the objective."""
         if self.objective == "energy":
             return path.energy_j(self.vertical_j_per_m, self.horizontal_j_per_m)
-        return path.length_m
+        return path.length_m if self.objective == "length" else self.cost_through(path.points)
 
 
 @dataclass(frozen=True, slots=True)
@@ -329,8 +384,9 @@ def straight_bound(problem: Problem, rounding_m: tuple[float, float] = (0.0, 0.0
     legs = [
         (max(b[0] - a[0], least_run_m(problem, a, b)), max(abs(b[1] - a[1]) - rise, 0.0)) for a, b in pairwise(known)
     ]
-    if problem.objective == "energy":
-        return sum(problem.vertical_j_per_m * up_m + problem.horizontal_j_per_m * run_m for run_m, up_m in legs)
+    if problem.rates is not None:
+        level, climbing = problem.rates
+        return sum(climbing * up_m + level * run_m for run_m, up_m in legs)
     return sum(math.hypot(*leg) for leg in legs)
 
 

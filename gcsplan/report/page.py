@@ -45,7 +45,7 @@ from gcsplan.report.views.profile import profile_html, profile_legend
 from gcsplan.report.views.replay import replay_html
 from gcsplan.report.views.space import drawn, space_data, space_html
 from gcsplan.report.views.tables import headline, rehearsal_html
-from gcsplan.units import KILOJOULE, Unit, Units, duration, in_units, span
+from gcsplan.units import KILOJOULE, SECOND, Unit, Units, duration, in_units, span
 from gcsplan.world.geometry.zones import no_fly_of, on_map
 from gcsplan.world.terrain.model_words import what_is_not_in
 
@@ -209,6 +209,8 @@ def _card(subject: Subject, index: int, page: Page) -> str:
     )
     if c is not None and c.objective == "energy":
         figures.insert(1, ("path energy", energy(c.cost, 1), _gap_words(c.bound, c.gap_percent, KILOJOULE)))
+    if c is not None and c.objective == "time":
+        figures.insert(1, ("path at full speed", num(c.cost, 1, SECOND), _gap_words(c.bound, c.gap_percent, SECOND)))
     cells = "".join(f"<div><dt>{name}</dt><dd>{value}<small>{more}</small></dd></div>" for name, value, more in figures)
     return (
         f'<article class="card t{index % COLOURS}"><h2><i class="swatch t{index % COLOURS}"></i>{esc(subject.name)}'

@@ -175,9 +175,13 @@ class Route:
         return True
 
     def cost_of(self, verdict: Verdict) -> float:
-        """Flown length in m, or energy in J by the stated model, of the path; holds do not count."""
+        """Flown length in m, energy in J or time in s by the stated model, of the path; holds do not count."""
         if self.case.objective == "length":
             return verdict.length_m
+        if self.case.objective == "time":
+            fast, up, down = self.request["speed_m_s"][1], self.request["climb_m_s"], self.request["descent_m_s"]  # type: ignore[index]
+            rises = [(leg, leg.end[2] - leg.start[2]) for leg in verdict.path_legs]
+            return math.fsum(max(leg.horizontal_m / fast, z / up, -z / down) * leg.times for leg, z in rises)
         return math.fsum((leg.energy_j - leg.hold_j) * leg.times for leg in verdict.legs if leg.on_path)
 
     def try_points(self, points: Floats, how: str, style: str) -> bool:

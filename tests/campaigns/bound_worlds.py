@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -77,6 +77,14 @@ class Case:
     arrival: dict[str, object] | None = None
     inside_m: float = 0.0
     """Above 0: the free part of the plane within so many metres around all is written as keep-in areas, no zone is."""
+
+    def timed(self, family: str) -> Case:
+        """The same world with the objective time and rates of climb and descent; a wing becomes a copter."""
+        rng = np.random.default_rng([self.seed, 52, *family.encode()])
+        rates = {key: float(rng.choice([0.5, 1.5, 3.0])) for key in ("climb_m_s", "descent_m_s")}
+        frame = "relative" if self.altitude_frame == "terrain" else self.altitude_frame
+        vehicles = [{k: x for k, x in v.items() if k != "turn_radius_m"} | rates for v in self.vehicles]
+        return replace(self, family=family, objective="time", altitude_frame=frame, vehicles=vehicles)
 
     def areas(self) -> list[Floats]:
         """Rings that share edges: together the box around all, without the barriers."""
@@ -584,10 +592,13 @@ FAMILIES: dict[str, Callable[[np.random.Generator], Case]] = {
         walls, slits, over, climbs, mountains, holes, stops, fleets, wings, returns, frames, bends, insides, banded,
     )
 }  # fmt: skip
+TIMED = tuple(f"{name}+time" for name in FAMILIES if name not in ("wings", "frames"))
 
 
 def make(family: str, seed: int) -> Case:
-    """World number ``seed`` of a family."""
+    """World number ``seed`` of a family; of one of `TIMED`, for the least time."""
+    if family in TIMED:
+        return make(family.removesuffix("+time"), seed).timed(family)
     case = FAMILIES[family](np.random.default_rng([seed, *family.encode()]))
     case.seed = seed
     if case.terrain is None and np.random.default_rng([seed, 7, *family.encode()]).random() < 0.3:

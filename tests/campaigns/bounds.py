@@ -10,7 +10,8 @@ judged by the check. A fault is
 - own cost: a plan costs less than its own bound;
 - silent: a refusal that stems from unknown ground does not name it (with the voids filled there is a plan);
 - not safe: the check does not pass the plan's own mission;
-- crash: anything but a plan or a refusal.
+- crash: anything but a plan or a refusal;
+- flown: a plan for the least time (`climbs+time` …) is flown faster than its bound.
 
     python -m tests.campaigns.bounds --seconds 120 [--seed N] [--families walls holes …] [--keep DIR]
 
@@ -39,8 +40,9 @@ from gcsplan import load_mission, plan
 from gcsplan.app.plan.model import Plan, VehiclePlan
 from gcsplan.errors import GcsplanError, InputError, NoMission
 from gcsplan.mavlink.files.waypoints_file import write_waypoints
+from gcsplan.planners.problem import UNIT_OF
 from tests.campaigns.bound_witnesses import Budget, Route, Witness, draw
-from tests.campaigns.bound_worlds import FAMILIES, Case, make
+from tests.campaigns.bound_worlds import FAMILIES, TIMED, Case, make
 
 ALLOWED_M, ALLOWED = 1e-3, 1e-7
 """A witness may be below a bound by this many metres plus this part of it."""
@@ -158,7 +160,7 @@ def _bounded(
     case: Case, planned: Plan, v: VehiclePlan, tally: Tally, rng: np.random.Generator, most: int, world_s: float
 ) -> Witness | None:
     """Attack one vehicle's bound; return the witness of a fault."""
-    unit = "m" if case.objective == "length" else "J"
+    unit = UNIT_OF[v.problem.objective]
     route = Route(case, planned, v, Budget(time.monotonic() + world_s, most))
     if route.verdict(v.mission).safe is not True:
         tally.fault("not safe", case, f"{v.name}: the check does not pass the plan's own mission")
@@ -169,6 +171,11 @@ def _bounded(
     per_m = 1.0
     if case.objective == "energy":
         per_m = max(v.request.vehicle.energy.horizontal_j_per_m, v.request.vehicle.energy.vertical_j_per_m)
+    if case.objective == "time":
+        per_m = 1.0 / min(v.problem.speed_m_s, v.problem.climb_m_s, v.problem.descent_m_s)
+        flown_s = math.fsum((leg.time_s - leg.hold_s) * leg.times for leg in v.verdict.path_legs)
+        if flown_s < bound:
+            tally.fault("flown", case, f"{v.name} is flown in {flown_s:.3f} s, and no path is below {bound:.3f} s")
     allowed = ALLOWED_M * per_m + ALLOWED * bound
     if v.cost < bound - allowed:
         tally.fault("own cost", case, f"{v.name} costs {v.cost:.4f} {unit}, and no path is below {bound:.4f} {unit}")
@@ -282,7 +289,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1, help="seed of the first world of each family")
     parser.add_argument("--worlds", type=int, help="seeds at most")
     parser.add_argument("--witnesses", type=int, help="stop after this many")
-    parser.add_argument("--families", nargs="+", default=list(FAMILIES), choices=list(FAMILIES))
+    parser.add_argument("--families", nargs="+", default=list(FAMILIES), choices=[*FAMILIES, *TIMED])
     parser.add_argument("--keep", type=Path, help="folder for the mission files and witnesses of faults")
     given = parser.parse_args()
     signals: list[int] = []

@@ -259,7 +259,7 @@ def test_ctrl_c_during_an_upload_says_what_is_unknown_now(run: Run, monkeypatch:
 
 @pytest.mark.parametrize(
     "slip",
-    [("--planner", "optimol"), ("--objective", "time"), ("--upload", "udpp:x"), ("--upload", ""), ("--png", "x.gif")],
+    [("--planner", "optimol"), ("--objective", "speed"), ("--upload", "udpp:x"), ("--upload", ""), ("--png", "x.gif")],
 )
 def test_a_slip_on_the_command_line_leaves_earlier_outputs_alone(
     run: Run, tmp_path: Path, slip: tuple[str, str]

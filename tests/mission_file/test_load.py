@@ -388,7 +388,7 @@ def test_a_mistake_in_the_arrival_is_told(arrival: Any, key: str, words: str) ->
         ({"name": "zzz"}, "planner.name", "known are optimal, krill"),
         ({"sede": 1}, "planner.sede", "did you mean seed?"),
         ({"seed": -1}, "planner.seed", "at least 0"),
-        ({"objective": "time"}, "planner.objective", "one of length, energy"),
+        ({"objective": "speed"}, "planner.objective", "one of length, energy, time"),
         ({"budget_s": 0}, "planner.budget_s", "above 0"),
         ({"parameters": {"a": [1]}}, "planner.parameters", "plain number or word"),
     ],

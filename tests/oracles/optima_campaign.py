@@ -3,6 +3,7 @@
 As a module: ``python -m tests.oracles.optima_campaign --seeds 0 500 --families passes climbs --effort patient``. It
 prints every mission on which something is wrong, and at the end a table of figures by family. It runs every family on
 one seed before the next seed, so a campaign ended by ``--minutes`` or Ctrl-C has covered all families equally.
+``--time``: with the objective time in place of each mission's own, at speeds drawn for it (`in_time`).
 """
 
 from __future__ import annotations
@@ -92,7 +93,7 @@ class Verdict:
 
 
 def judge(
-    family: str, seed: int, effort: Effort = QUICK, planner: Callable[[Problem], Solution] = plan, **changes: float
+    family: str, seed: int, effort: Effort = QUICK, planner: Callable[[Problem], Solution] = plan, **changes: object
 ) -> Verdict:
     """Plan one mission and compare the result with the exact check, brute force, and the best known path.
 
@@ -106,7 +107,7 @@ def judge(
     found = best_path(problem, seed, effort) if witness is None or effort is PATIENT else None
     costs = [cost_of(problem, way) for way in (witness, found) if way is not None]
     if case.discs is not None:
-        verdict.exact = exact_past_discs(case)
+        verdict.exact = exact_past_discs(replace(case, problem=problem))
         costs += [verdict.exact] if math.isfinite(verdict.exact) else []
     begun = time.perf_counter()
     try:
@@ -128,8 +129,7 @@ def judge(
     verdict.wrong += faults(case, solution.path)
     better = polish(problem, np.array(points), np.random.default_rng(seed), effort, widest=0.004)
     verdict.best = min([*costs, verdict.cost, cost_of(problem, better)])
-    touch = TOUCH_M * (1.0 if problem.objective == "length" else problem.vertical_j_per_m + problem.horizontal_j_per_m)
-    touch += 1e-9 * verdict.best
+    touch = TOUCH_M * dearest_metre(problem) + 1e-9 * verdict.best
     if solution.lower_bound is None or not math.isfinite(solution.lower_bound):
         verdict.wrong.append(f"no lower bound: {solution.lower_bound}")
         return verdict
@@ -145,10 +145,26 @@ def judge(
     return verdict
 
 
+def dearest_metre(p: Problem) -> float:
+    """The most that a metre costs."""
+    if p.objective == "time":
+        return 1.0 / min(p.speed_m_s, p.climb_m_s, p.descent_m_s)
+    return 1.0 if p.objective == "length" else p.vertical_j_per_m + p.horizontal_j_per_m
+
+
+def in_time(seed: int) -> dict[str, object]:
+    """The objective time, with speeds for one seed: fast and slow beside the rates of climb and descent."""
+    rng = np.random.default_rng([seed, 52])
+    rates = rng.choice([0.5, 1.5, 2.5, 5.0, 15.0], 2).tolist()
+    return {"objective": "time", "speed_m_s": float(rng.choice([5.0, 10.0, 15.0])), "climb_m_s": rates[0],
+            "descent_m_s": rates[1]}  # fmt: skip
+
+
 def reverse(p: Problem) -> Problem:
     """The same mission flown backwards: every path of one, reversed, is a path of the other."""
     limits = replace(p.limits, max_climb_deg=p.limits.max_descent_deg, max_descent_deg=p.limits.max_climb_deg)
-    return replace(p, start=p.goal, goal=p.start, via=p.via[::-1], limits=limits)
+    rates = {"climb_m_s": p.descent_m_s, "descent_m_s": p.climb_m_s}
+    return replace(p, start=p.goal, goal=p.start, via=p.via[::-1], limits=limits, **rates)
 
 
 def exact_past_discs(case: Case) -> float:
@@ -157,6 +173,8 @@ def exact_past_discs(case: Case) -> float:
     assert case.discs is not None
     flat = shortest_past_discs(p.start[:2], p.goal[:2], case.discs)
     rise = abs(p.goal[2] - p.start[2])
+    if p.objective == "time":
+        return max(flat / p.speed_m_s, rise / (p.climb_m_s if p.goal[2] > p.start[2] else p.descent_m_s))
     if p.objective == "energy":
         return p.horizontal_j_per_m * flat + p.vertical_j_per_m * rise
     return math.hypot(flat, rise)
@@ -249,6 +267,7 @@ def main() -> None:
         "--excess", type=float, default=math.inf, help="print missions this many percent over the best known"
     )
     parser.add_argument("--budget", type=float, help="the planner's budget_s, to set on a busy machine")
+    parser.add_argument("--time", action="store_true", help="with the objective time")
     parser.add_argument("--minutes", type=float, default=math.inf, help="start no mission after this many minutes")
     given = parser.parse_args()
     changes = {} if given.budget is None else {"budget_s": given.budget}
@@ -259,7 +278,8 @@ def main() -> None:
             before = time.perf_counter()
             if before - begun > 60.0 * given.minutes:
                 break
-            v = judge(family, seed, PATIENT if given.effort == "patient" else QUICK, **changes)
+            more = in_time(seed) if given.time else {}
+            v = judge(family, seed, PATIENT if given.effort == "patient" else QUICK, **changes, **more)
             v.judging_s = time.perf_counter() - before - v.planning_s
             verdicts.append(v)
             if v.wrong or (v.missed and given.missed) or 100.0 * v.excess > given.excess:

@@ -64,9 +64,12 @@ def is_feasible(problem: Problem, points: Floats) -> bool:
 
 
 def leg_costs(problem: Problem, a: Floats, b: Floats) -> Floats:
-    """Metres or joules of legs (..., 3) to (..., 3)."""
+    """Metres, joules or seconds of legs (..., 3) to (..., 3)."""
     d = b - a
     flat = np.hypot(d[..., 0], d[..., 1])
+    if problem.objective == "time":
+        times = flat / problem.speed_m_s, d[..., 2] / problem.climb_m_s, -d[..., 2] / problem.descent_m_s
+        return np.maximum.reduce(times)
     if problem.objective == "energy":
         return problem.horizontal_j_per_m * flat + problem.vertical_j_per_m * np.abs(d[..., 2])
     return np.hypot(flat, d[..., 2])
@@ -74,6 +77,8 @@ def leg_costs(problem: Problem, a: Floats, b: Floats) -> Floats:
 
 def cost_of(problem: Problem, points: Floats) -> float:
     """Cost of a path by the problem's objective."""
+    if problem.objective == "time":
+        return float(leg_costs(problem, points[:-1], points[1:]).sum())
     return problem.cost(Path(points))
 
 

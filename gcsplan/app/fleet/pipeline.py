@@ -23,7 +23,7 @@ from gcsplan.app.plan.left_out import LeavingOut
 from gcsplan.app.plan.model import Brief, Plan, PlanOptions, VehiclePlan
 from gcsplan.errors import InputError, NoMission, elements, unknown_name, wrong_argument
 from gcsplan.mission_file import MissionFile, load_mission
-from gcsplan.planners.problem import Problem, Progress, Solution
+from gcsplan.planners.problem import UNIT_OF, Problem, Progress, Solution
 from gcsplan.planners.registry import VOLUME_KEYS, AddedEntry
 from gcsplan.planners.registry import get as get_planner
 from gcsplan.planners.registry import own as own_planner
@@ -128,8 +128,8 @@ def _brief_of(source: MissionFile, given: PlanOptions) -> Brief:
     entry = get_planner(given.planner or source.planner.name) if own is None else own_planner(own)  # type: ignore[arg-type]
     name = entry.name
     goal = given.objective or source.planner.objective
-    if goal not in ("length", "energy"):
-        raise wrong_argument("plan()", "objective", goal, "'length' or 'energy'")
+    if goal not in UNIT_OF:
+        raise wrong_argument("plan()", "objective", goal, "'length', 'energy' or 'time'")
     merged = _options(source, name) | dict(given.options)
     if entry.warm_starts:
         _require_warm_start(source, merged)

@@ -216,16 +216,17 @@ def _vehicle(
     slot = None if fleet is None else fleet.slot(v.name)
     verdict = v.verdict
     lowest = verdict.lowest
-    length = v.problem.objective == "length"
+    objective = v.problem.objective
     bound = v.solution.lower_bound
     return {
         "name": v.name,
         "items": len(v.mission.wire_items()),
         "length_m": verdict.length_m,
-        "lower_bound_m": bound if length else None,
+        "lower_bound_m": bound if objective == "length" else None,
         "gap_percent": v.gap_percent,
         "energy_j": verdict.reported_j(verdict.path_energy_j),
-        "lower_bound_j": None if length else bound,
+        "lower_bound_j": bound if objective == "energy" else None,
+        **({"path_time_s": v.cost, "lower_bound_s": bound} if objective == "time" else {}),
         "flight_energy_j": verdict.reported_j(verdict.energy_j),
         "energy_figures": verdict.energy_figures,
         "battery_used_percent": verdict.battery_used_percent,

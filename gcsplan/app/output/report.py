@@ -15,6 +15,7 @@ from gcsplan.check.difference import PlanDifference
 from gcsplan.check.returns.verdict import WayHome
 from gcsplan.fleet.motion.timing import TimedPath
 from gcsplan.mission_file.published.times import hours_of
+from gcsplan.planners.problem import UNIT_OF
 from gcsplan.report.page import render_page
 from gcsplan.report.parts.html import stated
 from gcsplan.report.parts.page_data import Certificate, Compared, Page, Rehearsed, Subject
@@ -54,8 +55,8 @@ def page_of_plan(
     subjects = []
     for v in plan.vehicles:
         certificate = Certificate(
-            v.problem.objective, "m" if v.problem.objective == "length" else "J",
-            v.cost, v.solution.lower_bound, v.gap_percent, v.solution.stopped_by,
+            v.problem.objective, UNIT_OF[v.problem.objective], v.cost, v.solution.lower_bound, v.gap_percent,
+            v.solution.stopped_by,
         )  # fmt: skip
         slot, sent = None if fleet is None else fleet.slot(v.name), uploads.get(v.name)
         subjects.append(

@@ -20,7 +20,7 @@ NUMBER_ARGUMENTS = ("wind_m_s", "gusts_m_s", "noise_m", "from_deg", "tolerance_m
 
 EXPECTED: dict[str, tuple[Any, str]] = {
     "planner": ((str, Callable), "the name of a planner (`gcsplan planners` lists them), or a function that plans"),
-    "objective": (str, "'length' or 'energy'"),
+    "objective": (str, "'length', 'energy' or 'time'"),
     "seed": (Integral, "a whole number"),
     "options": (Mapping, "a mapping of a planner's keys"),
     "gate_utc": (datetime, "a datetime"),

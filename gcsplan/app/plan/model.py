@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
@@ -110,6 +111,8 @@ class VehiclePlan:
         if bound is None or self.verdict.findings:
             return
         per_m = max(1.0, self.problem.horizontal_j_per_m) if self.problem.objective == "energy" else 1.0
+        if self.problem.objective == "time":
+            per_m = max(float(self.problem.slope_costs(*leg)) for leg in ((1.0, 0.0), (0.0, 1.0), (0.0, -1.0)))
         if self.cost < bound - TOUCH_M * per_m - TOUCH * bound:
             raise GcsplanError(
                 f"{self.name}: a bug of gcsplan: the plan costs {self.cost:.3f}, less than its own lower bound of "
@@ -127,7 +130,12 @@ class VehiclePlan:
 
     @property
     def cost(self) -> float:
-        """Cost of the path as it is flown: metres, or joules if the objective is energy."""
+        """Cost of the path as it is flown: metres, or joules if the objective is energy; if it is time, seconds at full
+        speed, without what corners, speeding up and braking take."""
+        if self.problem.objective == "time":
+            legs = self.verdict.path_legs
+            times = ((self.problem.slope_costs(leg.horizontal_m, leg.end[2] - leg.start[2]), leg.times) for leg in legs)
+            return math.fsum(float(leg_s) * rounds for leg_s, rounds in times)
         return self.verdict.path_energy_j if self.problem.objective == "energy" else self.verdict.length_m
 
     @property

@@ -167,6 +167,8 @@ def make_problem(
     heed_cancel()
     vehicle = request.vehicle
     _require_one_height(source, request, world)
+    if objective == "time":
+        _require_times(source, vehicle)
     given, margins = margins, replace(margins, bow_m=bow_margin_m(request, world, margins))
     margins = replace(margins, track_m=margins.track_m + corner_m(vehicle))
     checked = vehicle.limits
@@ -196,9 +198,12 @@ def make_problem(
         start=(request.start[0], request.start[1], start_amsl),
         goal=(request.goal[0], request.goal[1], goal_amsl),
         via=via,
-        objective="energy" if objective == "energy" else "length",
+        objective=objective,  # type: ignore[arg-type]
         vertical_j_per_m=vehicle.energy.vertical_j_per_m,
         horizontal_j_per_m=least_horizontal_j_per_m(vehicle, request.start_deg[0]),
+        speed_m_s=vehicle.fastest_over_ground_m_s(vehicle.speed_max_m_s, start_amsl),
+        climb_m_s=vehicle.climb_m_s,
+        descent_m_s=vehicle.descent_m_s,
         turn_radius_m=vehicle.turn_radius_m,
         seed=seed,
         gap_percent=settings.gap_percent,
@@ -227,6 +232,20 @@ def least_horizontal_j_per_m(vehicle: Vehicle, home_lat_deg: float) -> float:
         near, far = (math.radians(max(abs(home_lat_deg) - part * FARTHEST_DEG, 0.0)) for part in (0.5, 1.0))
         fastest *= math.cos(far) / math.cos(near)
     return energy.horizontal_j_per_m + energy.base_w / fastest
+
+
+def _require_times(source: MissionFile, vehicle: Vehicle) -> None:
+    """Raise InputError where the objective ``time`` knows no time of a leg."""
+    words = ""
+    if vehicle.turn_radius_m > 0.0:
+        words = f"{vehicle.name} is a fixed wing, whose time depends on wind and thin air"
+    elif math.isinf(vehicle.climb_m_s + vehicle.descent_m_s):
+        words = f"climb_m_s and descent_m_s do not both bound {vehicle.name}, whose fastest path is the shortest then"
+    elif source.altitude_frame == "terrain":
+        words = "altitude_frame terrain leaves open how steep a leg is, because it follows the ground"
+    if words:
+        where = f"{source.path}: planner.objective"
+        raise InputError(f"the least time is not known, because {words}: use length", where=where)
 
 
 @dataclass(frozen=True)

@@ -110,8 +110,8 @@ ObjectiveOption = Annotated[
     typer.Option(
         "--objective",
         metavar="WHAT",
-        autocompletion=completion.words("length", "energy"),
-        help="length or energy.",
+        autocompletion=completion.words("length", "energy", "time"),
+        help="length, energy or time.",
     ),
 ]
 SeedOption = Annotated[int | None, typer.Option("--seed", metavar="N", help="Seed of everything random.")]

@@ -463,8 +463,8 @@ def _require_options(planner: str | None, objective: str | None, png: Path | Non
             registry.get(planner)
         except InputError as error:
             raise UsageError(f"--planner: {error}") from None
-    if objective not in (None, "length", "energy"):
-        raise UsageError(f"--objective {objective}: give length or energy")
+    if objective not in (None, "length", "energy", "time"):
+        raise UsageError(f"--objective {objective}: give length, energy or time")
     each = png is not None and (png.is_dir() or png == directory)
     drawn = png is not None and png.suffix.lower() in (".png", ".svg", ".pdf")
     if png is not None and not (each or (drawn and (png.parent.is_dir() or png.parent == directory))):

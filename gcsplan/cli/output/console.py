@@ -75,7 +75,7 @@ for screen in (console, aside):
 
 
 WIDEST = 100_000
-IN_WIND = "in the wind"
+IN_WIND, PATH_TIME = "in the wind", "path at full speed"
 """The column of the arrivals in the declared winds."""
 MOST_WITH_ALL_COLUMNS = 30
 """Most vehicles whose table has all columns, and whose transfers have a bar each."""
@@ -146,7 +146,7 @@ def verdict_cell(safe: bool | None, home: WayHome | None, units: Units, *, lines
 def plan_table(plan: Plan, homes: Mapping[str, WayHome], units: Units = METRIC) -> None:
     """Print a plan: a column for each vehicle, values beside their limits; a row for each in a large fleet."""
     rows = [plan_row(v, plan.fleet, homes.get(v.name), units, lines=len(plan.vehicles) > 1) for v in plan.vehicles]
-    for rare in (IN_WIND, "energy, mAh", f"over or under a zone, {units.distance.symbol}"):  # mostly there is none
+    for rare in (IN_WIND, PATH_TIME, "energy, mAh", f"over or under a zone, {units.distance.symbol}"):  # mostly none
         if all(row[rare] == "–" for row in rows):
             rows = [{name: words for name, words in row.items() if name != rare} for row in rows]
     if len(rows) > MOST_WITH_ALL_COLUMNS:
@@ -243,6 +243,7 @@ def plan_row(
         "vehicle": v.name,
         "items": str(len(v.mission.wire_items())),
         f"length, {units.path.symbol}": number(verdict.length_m, 0, units.path),
+        PATH_TIME: duration(v.cost, 1) if v.problem.objective == "time" else "–",
         "above the bound, %": number(v.gap_percent, 2),
         "energy, kJ": number(joules, 0, KILOJOULE) + mark,
         "energy, Wh": number(joules, 0, WATT_HOUR) + mark,

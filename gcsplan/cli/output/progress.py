@@ -27,11 +27,11 @@ LINE_S = 5.0
 
 
 class PlanningBoard:
-    """The state of the planning of some vehicles, as one line. ``objective``: length or energy."""
+    """The state of the planning of some vehicles, as one line. ``objective``: length, energy or time."""
 
     def __init__(self, names: Sequence[str], objective: str = "length") -> None:
         self._names = list(names)
-        self._unit, self._per_unit = ("kJ", 1e3) if objective == "energy" else ("m", 1.0)
+        self._unit, self._per_unit = {"energy": ("kJ", 1e3), "time": ("s", 1.0)}.get(objective, ("m", 1.0))
         self._begun_s = time.perf_counter()
         self._who = ""
         self._last = Progress(0.0, None, None)

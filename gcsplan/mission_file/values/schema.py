@@ -412,7 +412,7 @@ class PlannerKeys(Keys):
 
     name: Text = "optimal"
     """One of the [planners](planners.md)."""
-    objective: Literal["length", "energy"] = "length"
+    objective: Literal["length", "energy", "time"] = "length"
     """The quantity to minimise."""
     seed: Annotated[int, Field(ge=0, le=2**32 - 1)] = 1
     """Seed of all random numbers."""

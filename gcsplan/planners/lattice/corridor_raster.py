@@ -102,8 +102,7 @@ class CorridorRaster:
         A line of too many points is returned as it is.
         """
         p, n = self.problem, len(line.points)
-        energy = p.objective == "energy"
-        unit = p.horizontal_j_per_m if energy else 1.0
+        unit, climbing = p.rates or (1.0, 0.0)
         capacity = pull_kernels.MOST_PULLED
         if n > capacity - 2:
             return line
@@ -126,9 +125,9 @@ class CorridorRaster:
                 self.margin_m,
                 limits.max_climb_slope * self.slope_part,
                 limits.max_descent_slope * self.slope_part,
-                p.vertical_j_per_m,
+                climbing,
                 unit,
-                float(energy),
+                float(p.rates is not None),
                 MISSING_COST * unit,
                 p.airspace.beside_m(p.limits),
             ]

@@ -129,7 +129,7 @@ def _stopped_by(problem: Problem, why: Obstruction) -> str:
 
 
 def _unit(problem: Problem) -> float:
-    return problem.horizontal_j_per_m if problem.objective == "energy" else 1.0
+    return 1.0 if problem.rates is None else problem.rates[0]
 
 
 def sides_to_pass(problem: Problem, points: Floats, pinned: Bools, pin_m: Floats) -> dict[int, bool]:

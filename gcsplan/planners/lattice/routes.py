@@ -207,9 +207,10 @@ def frame_of(problem: Problem, level: LatticeSize) -> tuple[tuple[float, float, 
 
 def climbing_weight(problem: Problem) -> float:
     """Metres of track that cost as much as one metre of height; 0 if that has no price."""
-    if problem.objective != "energy":
+    if problem.rates is None:
         return 0.0
-    return problem.vertical_j_per_m / max(problem.horizontal_j_per_m, 1e-9)
+    level, climbing = problem.rates
+    return climbing / max(level, 1e-9)
 
 
 @dataclass(eq=False, slots=True)

@@ -33,7 +33,7 @@ from gcsplan.notes.note import Note
 from gcsplan.planners.optimal.loop.governor import govern
 from gcsplan.planners.optimal.loop.workspace import Workspace
 from gcsplan.planners.optimal.plane.incumbent import Incumbent
-from gcsplan.planners.optimal.table import all_searches
+from gcsplan.planners.optimal.table import all_searches, kinds, left_out
 from gcsplan.planners.optimal.window import plan_over
 from gcsplan.planners.problem import Problem, Refusal, Solution, terminals_of
 from gcsplan.planners.profile.climb_laps import on_the_spot
@@ -82,13 +82,31 @@ def _sharp(problem: Problem, sharp: bool = True) -> Solution:
         incumbent = Incumbent(problem)
         incumbent.take(on_the_spot(problem))
         return incumbent.solution()
-    incumbent = search(problem, sharp).incumbent
+    incumbent = _fastest(problem, sharp) if problem.objective == "time" else search(problem, sharp).incumbent
     if incumbent.best is None:
         raise explain(problem, proved=True if incumbent.proved_infeasible else None)
     found = incumbent.solution()
     if incumbent.problem.limits.max_agl_m is not None and found.stopped_by != "gap":
         found = replace(found, notes=(Note("bound_by_cells"),))
     return found
+
+
+def _fastest(problem: Problem, sharp: bool) -> Incumbent:
+    """`search` for the least time: over all slopes; then, for other paths, over slopes at full speed alone, where
+    tracks are as long as their climbs need."""
+    incumbent = search(problem, sharp).incumbent
+    if incumbent.best is None:
+        # Bounds count laps in place of a steep climb: what is proved of them need not hold of paths without.
+        shortest = search(replace(problem, objective="length"), sharp).incumbent
+        shortest.bound = incumbent.bound
+        incumbent.proved_infeasible = shortest.proved_infeasible
+        incumbent.take_over(shortest)
+    if incumbent.best is not None and incumbent.goes_on():
+        bounds = tuple(kind.NAME for kind in kinds() if kind.IMPROVES == "bounds")
+        options = {**problem.options, "without": (*left_out(problem), *bounds)}
+        gentle = replace(problem, limits=problem.at_full_speed(problem.limits), options=options)
+        incumbent.take_over(search(gentle, sharp).incumbent)
+    return incumbent
 
 
 def _under_one_ceiling(problem: Problem) -> Problem:

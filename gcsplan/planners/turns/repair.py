@@ -156,12 +156,9 @@ def _shortened(problem: Problem, here: Tried, k: int, patience: Patience) -> Tri
 
 
 def cost_of(problem: Problem, risen: Risen) -> float:
-    """Metres or joules of a flight, measured along the arcs, not their chords."""
+    """The cost of a flight, measured along the arcs, not their chords."""
     climbs = np.diff(risen.flown[:, 2])
-    if problem.objective == "energy":
-        flat = float(risen.true_m[-1])
-        return problem.vertical_j_per_m * float(np.abs(climbs).sum()) + problem.horizontal_j_per_m * flat
-    return float(np.hypot(np.diff(risen.true_m), climbs).sum())
+    return float(problem.slope_costs(np.diff(risen.true_m), climbs).sum())
 
 
 def tried(problem: Problem, arc_path: ArcPath, like: Tried | None = None) -> Tried:

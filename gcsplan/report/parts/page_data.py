@@ -30,7 +30,7 @@ from gcsplan.world.world import World
 
 @dataclass(frozen=True, eq=False)
 class Certificate:
-    """The quality of the path: ``bound`` and ``cost`` in ``unit`` (m or J), and why the search stopped."""
+    """The quality of the path: ``bound`` and ``cost`` in ``unit`` (m, J or s), and why the search stopped."""
 
     objective: str
     unit: str

@@ -29,7 +29,7 @@ from gcsplan.report.parts.page_data import Compared, Page, Subject
 from gcsplan.report.parts.track_samples import Passage, TrackLine
 from gcsplan.report.views.plan import COLOURS, zone_heights
 from gcsplan.report.views.profile import passed
-from gcsplan.units import KILOJOULE, Unit, Units, duration, in_units
+from gcsplan.units import KILOJOULE, SECOND, Unit, Units, duration, in_units
 from gcsplan.world.terrain.model_words import what_is_not_in
 
 MOST_DIFFERENCES = 30
@@ -232,13 +232,13 @@ def zones_table(page: Page, subject: Subject, line: TrackLine, found: Sequence[P
 
 
 def certificate_table(page: Page) -> str:
-    """Length or energy, the bound that no path can beat, and the gap between the two."""
+    """Length, energy or time, the bound that no path can beat, and the gap between the two."""
     rows = []
     for s in page.subjects:
         c = s.certificate
         if c is None:
             continue
-        unit = page.units.path if c.unit == "m" else KILOJOULE
+        unit = {"m": page.units.path, "J": KILOJOULE, "s": SECOND}[c.unit]
         rows.append(
             (
                 esc(s.name), esc(c.objective), num(c.cost, 1, unit),

@@ -37,7 +37,7 @@ def complete(run: Any, monkeypatch: pytest.MonkeyPatch) -> Any:
     [
         ("plan --planner ", list(registry.names())),
         ("rehearse --planner msf", ["msfoa"]),
-        ("plan --objective ", ["length", "energy"]),
+        ("plan --objective ", ["length", "energy", "time"]),
         ("plan --units a", ["aviation"]),
         ("plan --encoding b", ["box", "bspline"]),
         ("plan --cost k", ["krill"]),

@@ -157,7 +157,9 @@ class DetourSearch:
         most = _needed(self.incumbent.problem, choice, lack)
         wide = [b - a for a, b in zip(choice.least_m, most, strict=True)]
         k = int(np.argmax(wide))
-        if wide[k] * (self.incumbent.least(1.0) - self.incumbent.least(0.0)) <= NARROW * (hoped - self.incumbent.bound):
+        rates = self.incumbent.problem.rates
+        metre = self.incumbent.least(1.0) - self.incumbent.least(0.0) if rates is None else rates[0]
+        if wide[k] * metre <= NARROW * (hoped - self.incumbent.bound):
             return
         less, more = list(most), list(choice.least_m)
         less[k] = more[k] = choice.least_m[k] + 0.5 * wide[k]

@@ -120,6 +120,16 @@ class Incumbent:
         self.tell("improve")
         return True
 
+    def take_over(self, other: Incumbent) -> None:
+        """Take the path, the bound and the record of another search of the same ends under limits as tight."""
+        self.steps += other.steps
+        self.bound = max(self.bound, min(other.bound, self.cost))
+        if other.best is not None:
+            self.take(other.best, other.pinned)
+            if other.pinned is not None:
+                straighter = fewer(self.problem, other.best, other.pinned, LITTLE * self.cost)
+                self.take(*polished(self.problem, *straighter))
+
     def offer(self, found: tuple[Floats, Bools] | None) -> bool:
         """`take` a path that a search made from legs it checked one by one, if it found one and the path as a whole
         passes the exact check."""
@@ -133,7 +143,7 @@ class Incumbent:
     # ------------------------------------------------------------------------------------------------- bounds
 
     def raise_bound(self, cost: float) -> None:
-        """Raise the lower bound to ``cost``, metres or joules by the objective, if that is higher."""
+        """Raise the lower bound to ``cost``, in the objective's unit, if that is higher."""
         # The factor covers rounding in the bound's own arithmetic.
         self.bound = max(self.bound, min(cost * (1.0 - 1e-9), self.cost))
         self.tell("bound")
@@ -151,8 +161,8 @@ class Incumbent:
     def least(self, track_m: float) -> float:
         """The least cost of a path whose track is at least ``track_m`` metres long."""
         p = self.problem
-        if p.objective == "energy":
-            return p.horizontal_j_per_m * track_m + p.vertical_j_per_m * self.rise(-math.inf)
+        if p.rates is not None:
+            return p.least_cost(track_m, self.rise(-math.inf))
         # A straight line over the unrolled track: no path over it between the first and last altitude is shorter.
         return math.hypot(track_m, abs(self.known_m[-1] - self.known_m[0]))
 
@@ -164,25 +174,21 @@ class Incumbent:
     def highest(self, else_m: float) -> float:
         """An upper bound, metres AMSL, of the altitude of every path better than the best, which has only so much
         left to climb; ``else_m`` if none is known."""
-        p = self.problem
-        if self.best is None or (p.objective == "energy" and p.vertical_j_per_m == 0.0):
+        if self.best is None:
             return else_m
-        if p.objective == "energy":
-            climbed_m = (self.cost - p.horizontal_j_per_m * self.track_m) / p.vertical_j_per_m
-        else:
-            climbed_m = math.sqrt(max(self.cost**2 - self.track_m**2, 0.0))
+        climbed_m = self.problem.most_climbed_m(self.cost, self.track_m)
         spare_m = max(climbed_m - self.rise(-math.inf), 0.0)
         return min(max(self.known_m) + 0.5 * spare_m + HIGHER_M, else_m)
 
     def longest(self, else_m: float, cost: float | None = None, climbed_m: float = -math.inf) -> float:
         """An upper bound, metres, of the track length of every path cheaper than ``cost`` (None: than the best) that
         climbs and descends at least ``climbed_m`` in all; ``else_m`` if none is known."""
-        p = self.problem
+        rates = self.problem.rates
         cost = self.cost if cost is None else cost
-        if math.isinf(cost) or (p.objective == "energy" and p.horizontal_j_per_m == 0.0):
+        if math.isinf(cost) or (rates is not None and rates[0] == 0.0):
             return else_m
-        if p.objective == "energy":
-            return (cost - p.vertical_j_per_m * max(self.rise(-math.inf), climbed_m)) / p.horizontal_j_per_m
+        if rates is not None:
+            return (cost - rates[1] * max(self.rise(-math.inf), climbed_m)) / rates[0]
         return cost
 
     # ------------------------------------------------------------------------------------------------- where it stands

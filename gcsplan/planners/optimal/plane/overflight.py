@@ -162,9 +162,9 @@ class Overflight:
             return []
         p, incumbent = self.problem, self.incumbent
         lengths_m = [track_length_m(t) * (1.0 - 1e-9) for t in tracks]
-        if p.objective == "energy":
+        if p.rates is not None:
             top_m = max((float(self.outlines.tops_m[k]) for k in over), default=-math.inf)
-            least = p.horizontal_j_per_m * sum(lengths_m) + p.vertical_j_per_m * incumbent.rise(top_m)
+            least = p.least_cost(sum(lengths_m), incumbent.rise(top_m))
             level_m = max(top_m, *incumbent.known_m)
             ways = [np.column_stack([t, np.full(len(t), level_m)]) for t in tracks]
             return [_Case(least, next(self._number), shut, over, ways)]

@@ -1,4 +1,4 @@
-"""Lower bounds of length and energy from the plane: is any path cheaper than a value between bound and best path?
+"""Lower bounds of length, energy and time from the plane: is any path cheaper than a value between bound and best path?
 
 Few tracks are that short, can climb only little near their ends, and must climb over the ground on their way.
 If no path is cheaper, the value is the new bound. Otherwise the value replaces the upper end of the interval that is
@@ -44,7 +44,7 @@ PLAIN, BY_INTERVALS, REFINED = 0, 1, 2
 time; and with the cells that short enough tracks may meet cut finer."""
 SHARES = {PLAIN: 0.9, BY_INTERVALS: 0.08, REFINED: 0.04}
 ENERGY_SHARE = 0.5
-"""`PLAIN` for energy."""
+"""`PLAIN` for energy and time."""
 INTERVAL_S, REFINED_S = 0.7e-6, 4e-6
 """Counted seconds for each cell of the finer lattice near short tracks: what altitude intervals take on average, and
 the least that refinement takes in nine of ten missions. Refinement raises bounds even if it ends with the budget."""
@@ -74,13 +74,13 @@ class Bound(Search):
     @property
     def share(self) -> float:
         """By the effort."""
-        energy = self._effort == PLAIN and self.problem.objective == "energy"
-        return ENERGY_SHARE if energy else SHARES[self._effort or PLAIN]
+        linear = self._effort == PLAIN and self.problem.rates is not None
+        return ENERGY_SHARE if linear else SHARES[self._effort or PLAIN]
 
     @property
     def nearer(self) -> bool:
-        """The least effort is cheap and mostly helps, but for energy."""
-        return self._effort == PLAIN and self.problem.objective != "energy"
+        """The least effort is cheap and mostly helps, but for energy and time."""
+        return self._effort == PLAIN and self.problem.rates is None
 
     @property
     def _effort(self) -> int | None:
@@ -281,7 +281,7 @@ def longest_track(plane: PlaneSearch, cost: float) -> float:
     """An upper bound of the track length of paths cheaper than ``cost``: climbing leaves less than that for it."""
     legs, incumbent = plane.legs, plane.incumbent
     longest_m = incumbent.longest(sum(leg.reach_m for leg in legs), cost)
-    if plane.problem.objective == "energy":
+    if plane.problem.rates is not None:
         limits = [limit for _, limit in _limits(plane, longest_m)]
         climbed_m = climb_bound(legs, [leg.lower_m for leg in legs], limits)
         # Where the climb alone costs more, no length is left: take the shortest tracks, which nothing undercuts.
@@ -303,8 +303,8 @@ def _least_of_pieces(plane: PlaneSearch, tracks_m: list[float], spare_m: float) 
     for least, most in _pieces(tracks_m, spare_m):
         if plane.incumbent.least(sum(least)) >= found:
             break  # longer tracks cost no less
-        if p.objective == "energy":
-            piece = p.horizontal_j_per_m * sum(least) + p.vertical_j_per_m * climb_bound(legs, least, most)
+        if p.rates is not None:
+            piece = p.least_cost(sum(least), climb_bound(legs, least, most))
         else:
             piece = rise_bound(legs, least, most)
         found = min(found, piece)

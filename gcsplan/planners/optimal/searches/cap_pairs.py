@@ -1,4 +1,4 @@
-"""Paths below lower caps, which climb less, and a bound of energy from pairs of caps.
+"""Paths below lower caps, which climb less, and a bound of energy or time from pairs of caps.
 
 A path whose highest point lies between two altitude caps flies a track that is legal below the upper cap, and climbs at
 least to the lower cap. So the shortest track below the upper cap plus the climb to the lower one is a bound for all
@@ -19,14 +19,14 @@ NARROW_M = 0.25
 
 
 class CapPairs(Search):
-    """For energy, when a path is known, and again after a better one. Remembers nothing."""
+    """For energy and time, when a path is known, and again after a better one. Remembers nothing."""
 
     NAME, IMPROVES, SHARE, AGAIN = "cap_pairs", "paths, bounds", 0.5, True
 
     def applies(self) -> bool:
-        """Whether the objective is energy, a path is known, and no maximum AGL."""
+        """Whether the objective is energy or time, a path is known, and no maximum AGL."""
         p = self.problem
-        return p.objective == "energy" and self.incumbent.best is not None and p.limits.max_agl_m is None
+        return p.rates is not None and self.incumbent.best is not None and p.limits.max_agl_m is None
 
     def size(self) -> Size:
         """Three passes over the lattices."""
@@ -48,10 +48,10 @@ class Layer:
     track_m: float
     care: int = 0
 
-    def cost(self, rise: Callable[[float], float], vertical: float, horizontal: float) -> float:
-        """A lower bound of the energy of such paths. ``rise(amsl_m)``: least metres climbed and descended in all by a
-        path that reaches an altitude; ``vertical``, ``horizontal``: joules per metre."""
-        return vertical * rise(self.low_m) + horizontal * self.track_m
+    def cost(self, rise: Callable[[float], float], least_cost: Callable[[float, float], float]) -> float:
+        """A lower bound of the cost of such paths. ``rise(amsl_m)``: least metres climbed and descended in all by a
+        path that reaches an altitude; ``least_cost``: of so much track and rise (`Problem.least_cost`)."""
+        return least_cost(self.track_m, rise(self.low_m))
 
 
 def search_caps(
@@ -89,12 +89,12 @@ def search_caps(
 
 
 def bound_by_caps(plane: PlaneSearch) -> None:
-    """Look for paths below lower caps, which climb less, and raise the bound of energy to the least of all caps."""
+    """Look for paths below lower caps, which climb less, and raise the bound to the least of all caps."""
     p, incumbent = plane.problem, plane.incumbent
     tried: set[float] = set()
 
     def cost_of(layer: Layer) -> float:
-        return layer.cost(incumbent.rise, p.vertical_j_per_m, p.horizontal_j_per_m)
+        return layer.cost(incumbent.rise, p.least_cost)
 
     def track_m(cap: float, care: int) -> float:
         limits = [plane.limit(leg) for leg in plane.legs]

@@ -9,14 +9,14 @@ PAST_FINE, ROUNDS = 9, 2
 
 
 class FineDetours(Search):
-    """Once, when a path is known; for energy, beyond a gap of `FAR`. Remembers nothing."""
+    """Once, when a path is known; for energy and time, beyond a gap of `FAR`. Remembers nothing."""
 
     NAME, IMPROVES, SHARE = "detours", "paths", 0.3
 
     def applies(self) -> bool:
         """Whether a path is known, and no maximum AGL."""
         i = self.incumbent
-        far = self.problem.objective != "energy" or i.gap > FAR
+        far = self.problem.rates is None or i.gap > FAR
         return i.best is not None and far and self.problem.limits.max_agl_m is None
 
     def size(self) -> Size:
@@ -28,6 +28,6 @@ class FineDetours(Search):
         plane = self.work.plane
         if not plane.reach_longest():
             return
-        for _ in range(1 if self.problem.objective == "energy" else ROUNDS):
+        for _ in range(ROUNDS if self.problem.rates is None else 1):
             if not self.incumbent.goes_on() or not plane.past(PAST_FINE, fine=True):
                 break

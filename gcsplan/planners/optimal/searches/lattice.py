@@ -59,8 +59,8 @@ class LatticeSearch(Search):
                 incumbent.take(found)
             return
         # A line that is pulled to climb less may become illegal where a shorter one is not.
-        energy = self.problem.objective == "energy"
-        for problem in [self.problem, *([replace(self.problem, objective="length")] if energy else [])]:
+        shorter = [] if self.problem.rates is None else [replace(self.problem, objective="length")]
+        for problem in [self.problem, *shorter]:
             try:
                 found = plan_band(problem, incumbent.tell)
             except Refusal:

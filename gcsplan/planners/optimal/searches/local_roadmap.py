@@ -236,8 +236,9 @@ def _box(problem: Problem, ends: Floats, limit: float) -> tuple[Floats, Floats]:
     corners = grid.to_plane(c.ravel(), r.ravel())
     low, high = corners.min(axis=0), corners.max(axis=0)
     metres = limit
-    if problem.objective == "energy":
-        metres = limit / problem.horizontal_j_per_m if problem.horizontal_j_per_m > 0.0 else math.inf
+    if problem.rates is not None:
+        level, _ = problem.rates
+        metres = limit / level if level > 0.0 else math.inf
     width_m = math.dist(ends[0, :2], ends[-1, :2])
     cell_m = float(grid.metres_per_cell(*ends[0, :2].tolist()).max())
     # The minor axis of the ellipse of such ways, or its major axis beyond the ends.

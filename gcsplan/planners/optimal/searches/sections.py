@@ -75,8 +75,8 @@ def _side(problem: Problem, limit: float) -> tuple[Floats, Floats, Floats]:
     # The slope is raised by the rounding of its angle, so that a path exactly at the limit counts.
     k = min(limit, STEEPEST) + 2e-8
     beyond = np.array(BEYOND if limit < STEEPEST else ())
-    if problem.objective == "energy":
-        level, climb = problem.horizontal_j_per_m, problem.vertical_j_per_m
+    if problem.rates is not None:
+        level, climb = problem.rates
         slope = np.concatenate([[0.0, 0.5 * climb, climb], climb + beyond * level / k])
         over = np.maximum(slope - climb, 0.0)
         return slope, level - k * over, k * over

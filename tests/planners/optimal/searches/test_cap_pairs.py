@@ -34,6 +34,10 @@ from tests.support.searches import improve, looked
 HORIZONTAL, VERTICAL = 100.0, 120.0
 
 
+def energy(track_m: float, vertical_m: float) -> float:
+    return VERTICAL * vertical_m + HORIZONTAL * track_m
+
+
 # --- caps ---------------------------------------------------------------------------------------------------------
 
 
@@ -60,7 +64,7 @@ class Caps:
         return 2.0 * max(touched - self.low, 0.0)
 
     def cost(self, cap: float) -> float:
-        return VERTICAL * self.rise(cap) + HORIZONTAL * self.track(cap)
+        return energy(self.track(cap), self.rise(cap))
 
     def track_m(self, cap: float, care: int) -> float:
         self.asked.append((cap, care))
@@ -74,7 +78,7 @@ class Caps:
         self.try_at(self.top)
         layers = [Layer(self.low, self.top, self.track(self.top) * (1.0 - self.blind))]
         return search_caps(
-            layers, lambda layer: layer.cost(self.rise, VERTICAL, HORIZONTAL), self.track_m, lambda: self.best,
+            layers, lambda layer: layer.cost(self.rise, energy), self.track_m, lambda: self.best,
             self.try_at, gap, in_time,
         )  # fmt: skip
 
