@@ -43,6 +43,47 @@ def test_the_energy_objective_spends_no_more_than_the_shortest_way() -> None:
     assert summary_of(energy)["vehicles"][0]["lower_bound_m"] is None
 
 
+def on_a_hill(vehicle: dict[str, object], objective: str, **keys: object) -> str:
+    """A mission whose straight way leads over a block that is 300 m high."""
+    ring = [{"east_m": e, "north_m": n} for e, n in ((400, -300), (600, -300), (600, 300), (400, 300))]
+    return yaml.safe_dump(
+        {"version": 1, "terrain": {"flat_m": 100}, "frame": {"origin": [36.6, -84.3], "amsl_m": 0}, **keys,
+         "limits": {"min_agl_m": 30}, "no_fly": [{"name": "block", "polygon": ring, "ceiling_amsl_m": 300}],
+         "planner": {"objective": objective, "gap_percent": 1},
+         "vehicles": [{"name": "a", "sysid": 1, "autopilot": "arducopter", "speed_m_s": [3, 15],
+                       "start": {"east_m": 0, "north_m": 0}, "goal": {"east_m": 1000, "north_m": 0}, **vehicle}]}
+    )  # fmt: skip
+
+
+RATES = {"climb_m_s": 2.5, "descent_m_s": 1.5}
+
+
+@pytest.mark.slow
+def test_the_fastest_plan_tells_its_time_its_bound_and_the_gap() -> None:
+    (fast,), (short,) = (
+        summary_of(plan(on_a_hill(RATES | {"accel_m_s2": 1.5}, objective)))["vehicles"]
+        for objective in ("time", "length")
+    )
+    assert "lower_bound_s" not in short
+    assert fast["lower_bound_m"] is fast["lower_bound_j"] is None
+    assert 1200.0 / 15.0 <= fast["path_time_s"] <= 1.01 * fast["lower_bound_s"]
+    assert fast["gap_percent"] == pytest.approx(100.0 * (fast["path_time_s"] / fast["lower_bound_s"] - 1.0))
+    assert fast["path_time_s"] < fast["arrive_s"] < short["arrive_s"] - 60.0
+
+
+@pytest.mark.parametrize(
+    ("vehicle", "keys", "why"),
+    [({"autopilot": "arduplane", "turn_radius_m": 60}, {}, "fixed wing"), ({}, {}, "climb_m_s and descent_m_s"),
+     (RATES, {"altitude_frame": "terrain"}, "altitude_frame terrain")],
+)  # fmt: skip
+def test_a_fastest_path_that_is_not_known_is_refused_with_its_cure(
+    vehicle: dict[str, object], keys: dict[str, object], why: str
+) -> None:
+    with pytest.raises(InputError, match=f"{why}.*: use length") as refused:
+        plan(on_a_hill(vehicle, "time", **keys))
+    assert "planner.objective" in str(refused.value)
+
+
 @pytest.mark.parametrize(
     ("battery", "key"),
     [({"battery_wh": 10}, "battery_wh"), ({"battery_mah": 500, "battery_v": 22.2}, "battery_mah"),

@@ -55,6 +55,7 @@ def test_no_path_takes_less_than_its_track_and_its_climbs_do() -> None:
         assert vertical_m <= problem.most_climbed_m(cost, track_m) * (1.0 + 1e-12)
 
 
+@pytest.mark.slow
 def test_the_fastest_path_leads_around_what_the_shortest_climbs_over() -> None:
     problem = block(200.0)
     fastest, shortest = plan(problem), plan(replace(problem, objective="length"))
@@ -80,7 +81,7 @@ def test_a_steep_climb_takes_the_time_of_its_rise() -> None:
     assert fastest.lower_bound == pytest.approx(150.0 / CLIMB_M_S, rel=1e-6)
 
 
-@pytest.mark.nightly_but("climbs")
+@pytest.mark.nightly
 @pytest.mark.parametrize("family", [name for name in FAMILIES if name != "pockets"])
 def test_no_known_path_is_faster_than_the_bound(family: str) -> None:
     verdicts = [judge(family, seed, BRIEF, budget_s=2.0, **in_time(seed)) for seed in range(5, 9)]
