@@ -160,11 +160,9 @@ def fly(
         return taut_string(sections.s_m, low, high, *ends, limits.max_climb_slope, limits.max_descent_slope)
 
     def cost_of(p: Profile) -> float:
-        if problem.objective == "time":
-            return float(problem.slope_costs(np.diff(p.s_m), np.diff(p.amsl_m)).sum())
         if problem.objective == "energy":
             return problem.vertical_j_per_m * p.vertical_m + problem.horizontal_j_per_m * horizontal
-        return p.length_m
+        return float(problem.slope_costs(np.diff(p.s_m), np.diff(p.amsl_m)).sum())
 
     none: BandSides = (None,) * len(tube.bands)
     root = solve(none)
@@ -220,11 +218,10 @@ def lacking(problem: Problem, track: Track) -> Lacking | Closed:
             return None
         run, rise = np.diff(found.s_m), np.diff(found.amsl_m)
         needed = np.maximum(run, np.maximum(rise / up, -rise / down))
-        if problem.rates is not None:
-            level, climbing = problem.rates
-            cost = level * float(needed.sum()) + climbing * found.vertical_m
+        if problem.objective == "energy":
+            cost = problem.horizontal_j_per_m * float(needed.sum()) + problem.vertical_j_per_m * found.vertical_m
         else:
-            cost = float(np.hypot(needed, rise).sum())
+            cost = float(problem.slope_costs(needed, rise).sum())
         return cost, found, needed - run
 
     none: BandSides = (None,) * len(tube.bands)

@@ -32,6 +32,8 @@ LACKING_M, HAIR_M = 3.0, 0.2
 """If a track lacks less than `LACKING_M` between floor and ceiling, cells may be more lenient than the exact check,
 mostly beside terrain with a horizontal clearance: the search repeats under a cap lowered by the missing height and
 `HAIR_M`."""
+MOST_PUSHED = 100_000
+"""Most choices that one search weighs."""
 TAKEN = 5
 """Most tracks over which paths are looked for."""
 MORE = 1.1
@@ -84,7 +86,7 @@ class DetourSearch:
 
         for root in roots:
             push(0.0, root)
-        while open_set and taken < TAKEN and self.incumbent.goes_on():
+        while open_set and taken < TAKEN and pushed < MOST_PUSHED and self.incumbent.goes_on():
             key, _, length_m, choice, found, over = heappop(open_set)
             if over is not None:
                 if key < self.incumbent.cost:
