@@ -59,7 +59,8 @@ VEHICLE_PLAN = an_object(
      "lower_bound_j": MAYBE_NUMBER, "speed_m_s": NUMBER, "depart_s": NUMBER, "arrive_s": NUMBER,
      "stopped_by": {"enum": ["gap", "exhausted", "budget", "evaluations", "time"]},
      "min_agl_at": {"anyOf": [an_object({"leg": COUNT, "lat": NUMBER, "lon": NUMBER}), {"type": "null"}]}},
-    {**MORE_FIGURES, "hold_s": NUMBER, "planning_s": NUMBER, "first_path_s": NUMBER, "search": listed({}),
+    {**MORE_FIGURES, "path_time_s": NUMBER, "lower_bound_s": MAYBE_NUMBER, "hold_s": NUMBER, "planning_s": NUMBER,
+     "first_path_s": NUMBER, "search": listed({}),
      "upload": {"anyOf": [UPLOAD, {"type": "null"}]}, "parameters": listed({"type": "object"}),
      "raw_violations": COUNT, "repaired": FLAG},
 )  # fmt: skip

@@ -21,9 +21,9 @@ ORDER: dict[str, tuple[str, ...]] = {
         "dem_tiles", "dem_notice", "sea_tiles", "zones_sha256",
     ),
     "vehicles": (
-        "name", "items", "length_m", "lower_bound_m", "gap_percent", "energy_j", "lower_bound_j",
-        "battery_used_percent", "min_agl_m", "min_agl_at", "min_zone_clearance_m", "nearest_zone", "max_climb_deg",
-        "speed_m_s", "depart_s", "arrive_s", "arrive_earliest_s", "arrive_latest_s", "planning_s",
+        "name", "items", "length_m", "lower_bound_m", "gap_percent", "energy_j", "lower_bound_j", "path_time_s",
+        "lower_bound_s", "battery_used_percent", "min_agl_m", "min_agl_at", "min_zone_clearance_m", "nearest_zone",
+        "max_climb_deg", "speed_m_s", "depart_s", "arrive_s", "arrive_earliest_s", "arrive_latest_s", "planning_s",
         "first_path_s", "stopped_by", "safe", "not_judged", "upload",
     ),
     "min_agl_at": ("leg", "lat", "lon"),

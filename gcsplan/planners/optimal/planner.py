@@ -97,7 +97,8 @@ def _fastest(problem: Problem, sharp: bool) -> Incumbent:
     incumbent = search(problem, sharp).incumbent
     if incumbent.best is None:
         # Bounds count laps in place of a steep climb: what is proved of them need not hold of paths without.
-        shortest = search(replace(problem, objective="length"), sharp).incumbent
+        shorter = replace(problem, objective="length", progress=None, leaving=math.inf)
+        shortest = search(shorter, sharp).incumbent
         shortest.bound = incumbent.bound
         incumbent.proved_infeasible = shortest.proved_infeasible
         incumbent.take_over(shortest)
