@@ -13,6 +13,7 @@ from gcsplan.check.motion.stretch import Place, StretchKind
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.mavlink.mission.parameter_list import FlightExtent
 from gcsplan.notes.note import IN_FILES, Finding, Note, Wording
+from gcsplan.wind.drift import Drift, Drifts
 
 if TYPE_CHECKING:
     from gcsplan.check.flight.winds import FlightInWind
@@ -96,9 +97,6 @@ def _together(legs: Sequence[LegFigures]) -> LegFigures:
         max_agl_m=max((leg.max_agl_m for leg in legs if not math.isnan(leg.max_agl_m)), default=math.nan),
         zone_clearance_m=near.zone_clearance_m, nearest_zone=near.nearest_zone,
     )  # fmt: skip
-
-
-UNMOVED_S = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,10 +199,15 @@ class Verdict:
         return tuple(begins_s + float(s[last]) - stays_s for s in ends)  # type: ignore[return-value]
 
     @property
-    def unmoved_by_wind(self) -> bool:
-        """Whether each leg ends at the same time in every declared wind."""
-        window = None if self.in_wind is None else self.in_wind.window
-        return window is not None and bool((window.latest_s - window.earliest_s <= UNMOVED_S).all())
+    def drift(self) -> Drift | None:
+        """How much earlier or later each leg ends in each declared wind; None in still air, or if it cannot fly."""
+        return None if self.in_wind is None or self.in_wind.too_windy is not None else self.in_wind.drift
+
+    @property
+    def arrival_drift(self) -> Drifts:
+        """The drift of the arrival (1)."""
+        last, _ = self._arrival
+        return Drifts.none(1) if self.drift is None or last < 0 else self.drift.at_end_of(last)
 
     def leg_windows_s(self, slot: Slot | None = None) -> tuple[tuple[float, float], ...] | None:
         """The earliest and latest end of each leg, likewise, from leaving the ground as in `clock_s`."""

@@ -96,6 +96,7 @@ class WindsAlong:
     amsl_m: Floats
     agl_m: Floats
     at_s: Floats
+    circumscribed: bool = False
 
     @cached_property
     def _first(self) -> Indices:
@@ -169,6 +170,10 @@ class WindsAlong:
         east, north = self._expanded.course.T
         along = winds[..., 0] * east + winds[..., 1] * north
         across = winds[..., 1] * east - winds[..., 0] * north
+        if self.circumscribed:  # tangents to the arc of the fastest winds, which its own ends lie within
+            half = 0.5 * np.radians(np.diff(self.wind.from_deg)[0, 0, 0]) * (cells[:, 1, 1] - cells[:, 1, 0])
+            out = np.where([False, False, True, True], 1.0 / np.cos(half)[:, None], 1.0)[..., None]
+            return along * out, across * out, np.zeros((len(cells), len(self.part)))
         return along, across, self.wind.bow_m_s(cells, self.amsl_m, self.agl_m, self.at_s)
 
 

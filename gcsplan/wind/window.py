@@ -15,15 +15,21 @@ from typing import Protocol
 import numpy as np
 
 from gcsplan.arrays import Floats
-from gcsplan.wind.ability import ADVANCES_M_S, WindsAlong
+from gcsplan.wind.ability import ADVANCES_M_S, SpeedBounds, WindsAlong
 from gcsplan.wind.declared import DeclaredWind
 
-__all__ = ["FlightClock", "TimeWindow", "cover", "window"]
+__all__ = ["FlightClock", "TimeWindow", "Witnessed", "cover", "slowest_m_s", "window", "witnessed"]
 
 PART, OF_WIDTH, WITHIN_S = 1e-3, 0.03, 0.05
 MOST_WIND_CELLS = 128
 _TURNS = 8
 _FINE = 128
+WITNESS_M_S, MOST_SPEEDS, MOST_TURNS = 1.0, 5, 24
+"""A cell of `witnesses` spans at most about this, with no more cells of speeds and of directions than these."""
+WITNESS_M_S, MOST_SPEEDS, MOST_TURNS = 1.0, 5, 24
+"""A cell of `witnesses` spans at most about this, with no more cells of speeds and of directions than these."""
+CELL_GROUPS = 16
+"""Groups of neighbouring cells of `witnesses` for which the motion is computed."""
 
 _ONE = np.zeros((1, 2, 2))
 
@@ -78,14 +84,9 @@ def _within(winds: WindsAlong, clock: FlightClock, cells: Floats) -> list[TimeWi
     convex in the wind, so no more than at a corner, and no less than its tangent; what a flight takes beyond that sum
     hardly falls where speeds rise.
     """
-    found, most = winds.bounds(cells), winds.ability.most_m_s
-    corner = np.fmax(found.corner_m_s, ADVANCES_M_S)  # whoever flies at all is so fast
-    slow = corner.min(axis=1)
-    fast = np.minimum(found.top_m_s + found.beyond_m_s.max(axis=1), most)
-    top = np.minimum(found.top_m_s, most)
-    late = clock.summed(clock.run_m / corner).max(axis=1)
-    falls = np.where(found.top_m_s < most, clock.run_m / top**2, 0.0)[:, None] * found.beyond_m_s
-    early = clock.summed(clock.run_m / top) - clock.summed(falls).max(axis=1)
+    found = winds.bounds(cells)
+    corner, fast, early, late = _sums(found, winds, clock)
+    slow, early, late = corner.min(axis=1), early.min(axis=1), late.max(axis=1)
     at_fast, at_slow = clock.summed(clock.run_m / fast), clock.summed(clock.run_m / slow)
     windows = []
     for k in range(len(cells)):
@@ -94,6 +95,86 @@ def _within(winds: WindsAlong, clock: FlightClock, cells: Floats) -> list[TimeWi
         latest_s = rough.earliest_s - at_fast[k] + late[k] + loose_s
         windows.append(TimeWindow(np.maximum(rough.earliest_s, earliest_s), np.minimum(rough.latest_s, latest_s)))
     return windows
+
+
+def _sums(found: SpeedBounds, winds: WindsAlong, clock: FlightClock) -> tuple[Floats, Floats, Floats, Floats]:
+    """Of K cells: speeds (K, 4, P) at their corners, (K, P) the highest, and bounds (K, 4, N) of the sums of lengths
+    over speeds: with a mean of the corners' winds, a sum is between the same means of the two bounds."""
+    most = winds.ability.most_m_s
+    corner = np.fmax(found.corner_m_s, ADVANCES_M_S)  # whoever flies at all is so fast
+    fast = np.minimum(found.top_m_s + found.beyond_m_s.max(axis=1), most)
+    top = np.minimum(found.top_m_s, most)
+    falls = np.where(found.top_m_s < most, clock.run_m / top**2, 0.0)[:, None] * found.beyond_m_s
+    early = clock.summed(clock.run_m / top)[:, None] - clock.summed(falls)
+    return corner, fast, early, clock.summed(clock.run_m / corner)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Witnessed:
+    """Bounds at Q witnesses, whose means bound any wind of the set, as `gcsplan.wind.drift` counts them.
+
+    ``earliest_s``, ``latest_s`` (Q, N) are times. ``slower``, ``faster`` (Q, P): by which part of the seconds at
+    ``still_m_s`` a part may take longer, and shorter.
+    """
+
+    earliest_s: Floats
+    latest_s: Floats
+    slower: Floats
+    faster: Floats
+
+
+def witnessed(winds: WindsAlong, clock: FlightClock, still_m_s: Floats) -> Witnessed:
+    """The bounds at the corners of all cells of `witnesses`, or of the whole set where it is not cut."""
+    if winds.wind.single or winds.wind.varying:
+        slow, fast = winds.speeds_m_s(cover(winds.wind))
+        slow, fast = np.fmax(slow, ADVANCES_M_S).min(axis=0), fast.max(axis=0)
+        at = clock.between(slow, fast)
+        return _alike(at, slow, fast, still_m_s)
+    found = winds.bounds(witnesses(winds.wind))
+    corner, fast, early, late = _sums(found, winds, clock)
+    slow = corner.min(axis=1)
+    if (slow == fast[0]).all() and (fast == fast[0]).all():
+        return _alike(clock.between(slow[0], fast[0]), slow.min(axis=0), fast.max(axis=0), still_m_s)
+    # The motion is computed for neighbouring cells together: it is what takes the time.
+    for some in np.array_split(np.arange(len(fast)), min(CELL_GROUPS, len(fast))):
+        low, high = slow[some].min(axis=0), fast[some].max(axis=0)
+        rough, loose_s = clock.between(low, high), clock.loose_s(low, high)
+        at_low, at_high = clock.summed(clock.run_m / low), clock.summed(clock.run_m / high)
+        early[some] += rough.latest_s - at_low - loose_s
+        late[some] += rough.earliest_s - at_high + loose_s
+        # A cell's bounds are means of its corners', or the same for all of it: whichever are nearer.
+        apart = (late[some] - early[some]).max(axis=1)
+        flat = (apart >= rough.latest_s - rough.earliest_s)[:, None]
+        early[some] = np.where(flat, rough.earliest_s, early[some])
+        late[some] = np.where(flat, rough.latest_s, late[some])
+    top = np.minimum(found.top_m_s, winds.ability.most_m_s)[:, None]
+    beyond = np.where(found.top_m_s < winds.ability.most_m_s, 1.0, 0.0)[:, None] * found.beyond_m_s
+    slower, faster = still_m_s / corner - 1.0, 1.0 - still_m_s / top + still_m_s * beyond / top**2
+    return Witnessed(*(x.reshape(-1, x.shape[-1]) for x in (early, late, slower, faster)))
+
+
+def _alike(at: TimeWindow, slow: Floats, fast: Floats, still_m_s: Floats) -> Witnessed:
+    """The bounds of a set whose winds all count together."""
+    return Witnessed(*(x[None] for x in (at.earliest_s, at.latest_s, still_m_s / slow - 1.0, 1.0 - still_m_s / fast)))
+
+
+def slowest_m_s(winds: WindsAlong, gust_m_s: float = 0.0) -> Floats:
+    """(P,) no speed over ground is lower at any witness, nor in any wind; ``gust_m_s`` as in `WindsAlong`."""
+    slow: Floats = winds.speeds_m_s(cover(winds.wind), gust_m_s)[0].min(axis=0)
+    if not (winds.wind.single or winds.wind.varying):
+        at_corners: Floats = winds.bounds(witnesses(winds.wind), gust_m_s).corner_m_s.min(axis=(0, 1))
+        slow = np.minimum(slow, at_corners)
+    return slow
+
+
+def witnesses(wind: DeclaredWind) -> Floats:
+    """(K, 2, 2) cells of shares that depend on the set alone, so that they are the same for all vehicles."""
+    turn_m_s = np.radians(np.diff(wind.from_deg)[..., 0]) * wind.speed_m_s[..., 1]
+    speeds = int(np.clip(np.ceil(np.diff(wind.speed_m_s).max() / WITNESS_M_S), 1, MOST_SPEEDS))
+    turns = int(np.clip(np.ceil(turn_m_s.max() / WITNESS_M_S), 1, MOST_TURNS))
+    turns = max(turns, int(np.ceil(np.diff(wind.from_deg).max() / 90.0)))
+    edges = [list(pairwise(np.linspace(0.0, 1.0, n + 1).tolist())) for n in (speeds, turns)]
+    return np.array([[speed, turn] for turn in edges[1] for speed in edges[0]])
 
 
 def _searched(winds: WindsAlong, clock: FlightClock) -> TimeWindow:

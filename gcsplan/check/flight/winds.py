@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -22,7 +22,8 @@ from gcsplan.fleet.motion.ardupilot import leaning_m_s
 from gcsplan.vehicle import AIRSPEED_SPARE, Vehicle
 from gcsplan.wind.ability import ADVANCES_M_S, Ability, WindsAlong, circle_ratio
 from gcsplan.wind.declared import DeclaredWind, FlightWind
-from gcsplan.wind.window import TimeWindow, cover, window
+from gcsplan.wind.drift import Drift
+from gcsplan.wind.window import TimeWindow, cover, slowest_m_s, window, witnessed
 from gcsplan.world.geodesy.atmosphere import true_per_indicated
 
 __all__ = ["Costs", "FlightInWind", "TooWindy", "WaysHome", "air_m_s", "gust_length_m"]
@@ -40,6 +41,8 @@ GUST_SIGMAS = 3.0
 distance by which turbulence displaces an aircraft."""
 
 LOW_FT, HIGH_FT, FOOT_M = 10.0, 1000.0, 0.3048
+STRETCHES_BESIDE = 2
+"""Stretches before and after one at whose speeds it may be flown, while the aircraft speeds up and brakes."""
 _TRIED_STEPS = 12
 _TIMED_CELLS = 16
 _NO_RUN_M = 1e-6
@@ -165,6 +168,59 @@ class FlightInWind:
             fastest = self._ability.most_m_s
             earliest_s = np.maximum(earliest_s, np.minimum(found.earliest_s, self.between(fastest, fastest).earliest_s))
         return TimeWindow(earliest_s, found.latest_s + late_s)
+
+    @cached_property
+    def drift(self) -> Drift:
+        """How much earlier or later than in still air each stretch ends, its hold included, in each wind at once.
+
+        Of a flight that can be flown in all winds and flies no stretch twice. Gusts have no share in what two vehicles
+        have in common: theirs count outward for each.
+        """
+        still_m_s = self._ability.slowest_m_s(zero := np.zeros(len(self._run_m)), zero)
+        # Without a forecast the window, which is a search, is not needed here.
+        along = self._witnessing(self._timed[1] if len(self.wind.times_s) > 1 else self._any_hour)
+        found = witnessed(along, self, still_m_s)
+        late_s, early_s = self._gust_s(along, found.latest_s.max(axis=0))
+        earliest_s = found.earliest_s - early_s
+        if len(earliest_s) == 1 and not self.vehicle.keeps_airspeed:  # no gust makes it faster than commanded
+            fastest = self.between(self._ability.most_m_s, self._ability.most_m_s).earliest_s
+            earliest_s = np.maximum(earliest_s, np.minimum(found.earliest_s, fastest))
+        hold = np.array([0.0 if math.isinf(s.hold_s) else s.hold_s for s in self.stretches])
+        still_s = np.cumsum((self._still_s + hold) * self._rounds)
+        least_s, most_s = self._held_s
+        rises, falls = (self._nearby(np.maximum(rate, 0.0)) for rate in (found.slower, found.faster))
+        gusts_s = np.diff(late_s, prepend=0.0) + np.diff(early_s, prepend=0.0)
+        beside = np.maximum(self._uneven_s, np.maximum(np.roll(self._uneven_s, 1), np.roll(self._uneven_s, -1)))
+        loose_s = gusts_s + np.where((rises + falls).any(axis=0), beside, 0.0)
+        loose_s += np.abs(least_s - hold) + np.abs(most_s - hold)
+        return Drift(
+            np.array([s.seq for s in self.stretches], dtype=np.intp), earliest_s - still_s,
+            found.latest_s + late_s - still_s, rises, falls, loose_s,
+        )  # fmt: skip
+
+    @cached_property
+    def keeps_part(self) -> float:
+        """The part of its commanded speed that a multicopter keeps along its path in every declared wind, with gusts.
+
+        1 or more: no wind changes a time there. inf for a fixed wing, whose speed over ground is never the same.
+        """
+        on_path = np.array([s.on_path for s in self.stretches])[self._parts.stretch] & (self._run_m > _NO_RUN_M)
+        if self.vehicle.keeps_airspeed or not on_path.any():
+            return math.inf
+        free = replace(self._ability, most_m_s=np.full(len(self._run_m), math.inf))
+        slow = slowest_m_s(replace(self._witnessing(self._any_hour), ability=free), self.wind.gusts_add_m_s)
+        return float((slow / self._ability.most_m_s)[on_path].min())
+
+    def _witnessing(self, hours_s: Floats) -> WindsAlong:
+        one_level = len(self.wind.heights_m) == 1 and len(self.wind.times_s) == 1
+        return replace(self._along(self.wind, hours_s), circumscribed=one_level)
+
+    def _nearby(self, rates: Floats) -> Floats:
+        """(Q, N) the largest of the rates (Q, P) of the parts of each stretch and of those before and after it."""
+        count = len(self.stretches)
+        own = np.zeros((count + 2 * STRETCHES_BESIDE, len(rates)))
+        np.maximum.at(own, self._parts.stretch + STRETCHES_BESIDE, rates.T)
+        return np.asarray(np.max([own[k : k + count] for k in range(2 * STRETCHES_BESIDE + 1)], axis=0).T)
 
     @cached_property
     def costs(self) -> Costs:
