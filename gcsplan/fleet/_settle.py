@@ -13,12 +13,12 @@ from typing import Literal
 
 import numpy as np
 
+from gcsplan.fleet._sweep import reach_of
 from gcsplan.fleet._taken import Spans, Taken
 from gcsplan.fleet.arrival import WITHIN_S, Craft, Crew, Hold, Mode, Schedule, Slot, schedule
 from gcsplan.fleet.motion.timing import Route, TimedPath, speed_for
 from gcsplan.fleet.separation import TOLERANCE_M, Conflict, Rules, separation
 from gcsplan.notes.note import Note
-from gcsplan.vehicle import Vehicle
 
 How = Literal["as scheduled", "departure", "speed", "hold", "path"]
 
@@ -97,8 +97,8 @@ class Freedom:
 class Chooser:
     """The options of one vehicle on one route, against the vehicles that have priority."""
 
-    def __init__(self, vehicle: Vehicle, route: Route, was: Slot, freedom: Freedom, taken: Taken) -> None:
-        self.craft = Craft(Crew(vehicle, route))
+    def __init__(self, crew: Crew, was: Slot, freedom: Freedom, taken: Taken) -> None:
+        self.craft = Craft(crew)
         self.was, self.freedom, self.taken = was, freedom, taken
 
     def base(self) -> Option | None:
@@ -159,7 +159,8 @@ class Chooser:
         if self.freedom.hold != "ground":
             return option if self.clear(option) else None
         last = max((p.end_s for p in self.taken.paths), default=0.0)
-        latest = max(last - option.path.begin_s, 0.0) + 2.0 * self.taken.rules.window_s + 1.0
+        reach_s = [reach_of(p, self.taken.rules.window_s) for p in (*self.taken.paths, option.path)]
+        latest = max(last - option.path.begin_s, 0.0) + 2.0 * max(reach_s) + 1.0
         spans, low, high = Spans.none(), 0.0, 0.0
         for horizon in HORIZONS_S:
             earlier, later = max(-horizon, -option.slot.depart_s), min(horizon, latest)
@@ -273,7 +274,7 @@ class Chooser:
         return Option(slot.energy_j - was.energy_j, moved, how, slot, self._motion(slot))
 
     def _motion(self, slot: Slot) -> TimedPath:
-        return self.craft.course.fly(slot.speed_m_s, slot.depart_s, slot.hold_s)
+        return self.craft.motion(slot)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -398,7 +399,7 @@ def _settle(plan: Schedule, job: Job, done: ChoicesByName) -> tuple[Settlement, 
     again; else it is left out, or ends this.
     """
     order = list(plan.order if job.priority is None else job.priority)
-    slots, vehicles = {s.name: s for s in plan.slots}, {c.name: c.vehicle for c in job.crews}
+    slots, crews = {s.name: s for s in plan.slots}, {c.name: c for c in job.crews}
     freedom = Freedom(plan.mode, job.hold, job.later_s)
     promoted: set[str] = set()
     left: list[Stuck] = []
@@ -407,7 +408,7 @@ def _settle(plan: Schedule, job: Job, done: ChoicesByName) -> tuple[Settlement, 
     while turn < len(order):
         name = order[turn]
         was = slots[name]
-        found = _choice(Chooser(vehicles[name], was.route, was, freedom, taken), plan, job)
+        found = _choice(Chooser(replace(crews[name], route=was.route), was, freedom, taken), plan, job)
         if isinstance(found, Choice):
             done = done | {name: found}
             taken.add(found.option.path)
@@ -463,7 +464,7 @@ def _other_path(name: str, chooser: Chooser, met: Sequence[Conflict], replan: Re
         route = replan(name, tuple(avoid), attempt)
         if route is None:
             return None
-        other = Chooser(chooser.craft.vehicle, route, chooser.was, chooser.freedom, chooser.taken)
+        other = Chooser(replace(chooser.craft.crew, route=route), chooser.was, chooser.freedom, chooser.taken)
         base = other.base()
         if base is None:
             continue  # too long to arrive in time, or too short without waiting
@@ -496,4 +497,4 @@ def with_leaving(rules: Rules, plan: Schedule) -> Rules:
 
 
 def motion_of(slot: Slot, crew: Crew) -> TimedPath:
-    return Craft(crew).course.fly(slot.speed_m_s, slot.depart_s, slot.hold_s)
+    return Craft(crew).motion(slot)

@@ -14,6 +14,7 @@ import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.fleet.motion.timing import TimedPath
+from gcsplan.wind.drift import Drifts, between
 
 PARALLEL = 1e-13
 """Part of |v|²|u|² below which two velocities count as parallel: the minimum then also lies on an edge."""
@@ -28,21 +29,31 @@ SLICES = (16, 512)
 ROWS_AT_ONCE = 400_000
 """Rows that are handled together, about: some tens of megabytes."""
 
+DRIFTS_AT_ONCE = 4_000_000
+"""Drifts of pairs that are compared together, at all witnesses."""
+
+Apart = tuple[float | Floats, float | Floats]
+"""The least and the most of a difference of two times, s, for each row or for all."""
+
 SLACK_M = 1e-7
 """Metres by which rounding may falsify a bound, and so the largest distance error of the search."""
 
 
 @dataclass(frozen=True, slots=True)
 class Pieces:
-    """Straight motions: at ``places`` (n, 3) at ``from_s`` (n,), then with ``velocity`` (n, 3) until ``to_s`` (n,)."""
+    """Straight motions: at ``places`` (n, 3) at ``from_s`` (n,), then with ``velocity`` (n, 3) until ``to_s`` (n,).
+
+    ``drifts`` (n of them): how much earlier or later each may be in a declared wind; None if no wind changes a time.
+    """
 
     from_s: Floats
     to_s: Floats
     places: Floats
     velocity: Floats
+    drifts: Drifts | None = None
 
     def take(self, rows: Indices) -> Pieces:
-        """The pieces of ``rows``, which may repeat."""
+        """The pieces of ``rows``, which may repeat, without their drifts."""
         return Pieces(self.from_s[rows], self.to_s[rows], self.places[rows], self.velocity[rows])
 
     def joined(self, other: Pieces) -> Pieces:
@@ -52,21 +63,40 @@ class Pieces:
             np.concatenate([self.to_s, other.to_s]),
             np.concatenate([self.places, other.places]),
             np.concatenate([self.velocity, other.velocity]),
+            None if self.drifts is other.drifts is None else self._drifts().joined(other._drifts()),
         )
+
+    def _drifts(self) -> Drifts:
+        return Drifts.none(len(self.from_s)) if self.drifts is None else self.drifts
+
+    def apart_s(self, a: Indices, other: Pieces, b: Indices, window_s: float) -> Apart:
+        """The least and the most by which the time table's times of two places may differ if two are there at once:
+        pieces ``a`` (n,), less pieces ``b`` (n,) of others. Each may be ``window_s`` off besides, whatever the wind."""
+        wide = 2.0 * window_s
+        if self.drifts is other.drifts is None:
+            return -wide, wide
+        low, high = np.empty(len(a)), np.empty(len(a))
+        mine, theirs = self._drifts(), other._drifts()
+        step = max(1, DRIFTS_AT_ONCE // max(len(mine.early), len(theirs.early), 1))
+        for k in range(0, len(a), step):
+            some = slice(k, k + step)
+            low[some], high[some] = between(mine.take(a[some]), theirs.take(b[some]))
+        return (np.minimum(low, -wide), np.maximum(high, wide)) if wide else (low, high)
 
     def at(self, times_s: Floats) -> Floats:
         """(n, 3) places at ``times_s`` (n,), each on its own piece."""
         return np.asarray(self.places + self.velocity * (times_s - self.from_s)[:, None])
 
 
-def nearest(a: Pieces, b: Pieces, apart_s: float = 0.0) -> tuple[Floats, Floats, Floats]:
-    """Least distance (n,) between a at t1 and b at t2, and both times, over all |t1 - t2| <= ``apart_s``.
+def nearest(a: Pieces, b: Pieces, apart_s: Apart = (0.0, 0.0)) -> tuple[Floats, Floats, Floats]:
+    """Least distance (n,) between a at t1 and b at t2, and both times, over all t1 - t2 within ``apart_s``.
 
     All rows must overlap in time, or be within ``apart_s`` of it. The squared distance is a convex quadratic in (t1,
     t2) over a box cut by a strip. Its minimum is inside, or on one of six edges, where it is a quadratic of one
     variable. The result is never below the true minimum, and above it only by rounding.
     """
-    if apart_s <= 0.0:
+    least, most = apart_s
+    if np.ndim(least) == 0 and least == most == 0.0:
         lo, hi = np.maximum(a.from_s, b.from_s), np.minimum(a.to_s, b.to_s)
         gap, closing = a.at(lo) - b.at(lo), a.velocity - b.velocity
         after, square = _on_edge(gap, closing, np.zeros(len(lo)), hi - lo)
@@ -88,23 +118,27 @@ def nearest(a: Pieces, b: Pieces, apart_s: float = 0.0) -> tuple[Floats, Floats,
     safe = np.where(crossing, det, 1.0)
     vd, ud = _dot(v, d), _dot(u, d)
     x, y = (vu * ud - uu * vd) / safe, (vv * ud - vu * vd) / safe
-    inside = crossing & (x >= 0.0) & (x <= long_a) & (y >= 0.0) & (y <= long_b) & (np.abs(x - y + ahead) <= apart_s)
+    inside = crossing & (x >= 0.0) & (x <= long_a) & (y >= 0.0) & (y <= long_b) & _within(x - y + ahead, least, most)
     gap = d + v * x[:, None] - u * y[:, None]
     offer(x, y, _dot(gap, gap), inside)
     zero = np.zeros(len(d))
     for x in (zero, long_a):
-        low, high = np.maximum(0.0, x + ahead - apart_s), np.minimum(long_b, x + ahead + apart_s)
+        low, high = np.maximum(0.0, x + ahead - most), np.minimum(long_b, x + ahead - least)
         y, square = _on_edge(d + v * x[:, None], -u, low, high)
         offer(x, y, square, low <= high)
     for y in (zero, long_b):
-        low, high = np.maximum(0.0, y - ahead - apart_s), np.minimum(long_a, y - ahead + apart_s)
+        low, high = np.maximum(0.0, y - ahead + least), np.minimum(long_a, y - ahead + most)
         x, square = _on_edge(d - u * y[:, None], v, low, high)
         offer(x, y, square, low <= high)
-    for side in (-apart_s, apart_s):  # y = x + ahead + side
-        low, high = np.maximum(0.0, -ahead - side), np.minimum(long_a, long_b - ahead - side)
-        x, square = _on_edge(d - u * (ahead + side)[:, None], v - u, low, high)
-        offer(x, x + ahead + side, square, low <= high)
+    for side in (most, least):  # y = x + ahead - side
+        low, high = np.maximum(0.0, side - ahead), np.minimum(long_a, long_b - ahead + side)
+        x, square = _on_edge(d - u * (ahead - side)[:, None], v - u, low, high)
+        offer(x, x + ahead - side, square, low <= high)
     return np.sqrt(best), a.from_s + best_x, b.from_s + best_y
+
+
+def _within(x: Floats, least: float | Floats, most: float | Floats) -> Bools:
+    return np.asarray((least <= x) & (x <= most))
 
 
 def below(a: Pieces, b: Pieces, needed_m: float) -> tuple[Floats, Floats]:
@@ -191,13 +225,15 @@ class Fleet:
 
     ``pieces`` holds the pieces of all vehicles in turn, ``offset`` (V,) the first of each. ``nodes`` (V, K + 1, 3) are
     the places at the slices' ends (on the ground before take-off and after landing). ``stray`` is (V, K), in metres.
-    ``fastest`` (V, K) is the top speed, m/s, in a slice and a window about it. ``begins`` and ``ends`` (V,) are the
-    times in the air. ``first`` and ``last`` (V, K) are the pieces in a slice and a window about it, numbered over all
+    A vehicle is within ``reach_s`` (V,) of its time table: its drift in the declared winds, or ``window_s``.
+    ``fastest`` (V, K) is the top speed, m/s, in a slice and this about it. ``begins`` and ``ends`` (V,) are the times
+    in the air. ``first`` and ``last`` (V, K) are the pieces in a slice and ``reach_s`` about it, numbered over all
     vehicles.
     """
 
     paths: tuple[TimedPath, ...]
     window_s: float
+    reach_s: Floats
     edges_s: Floats
     pieces: Pieces
     offset: Indices
@@ -217,7 +253,8 @@ class Fleet:
     @classmethod
     def of(cls, paths: Sequence[TimedPath], window_s: float = 0.0) -> Fleet:
         """Slice the motions of ``paths`` (at least one), each up to ``window_s`` early or late."""
-        edges = _edges(paths, window_s)
+        reach_s = np.array([reach_of(path, window_s) for path in paths])
+        edges = _edges(paths, float(reach_s.max()))
         count = len(edges) - 1
         shape = (len(paths), count)
         nodes, stray, fastest = np.empty((len(paths), count + 1, 3)), np.empty(shape), np.empty(shape)
@@ -226,32 +263,29 @@ class Fleet:
         for v, path in enumerate(paths):
             piece = pieces_of(path)
             nodes[v], stray[v] = _strays(path, edges)
-            low = np.searchsorted(piece.from_s, edges[:-1] - window_s, side="right") - 1
-            high = np.searchsorted(piece.from_s, edges[1:] + window_s, side="left") - 1
-            high[-1] = np.searchsorted(piece.from_s, edges[-1] + window_s, side="right") - 1  # with the stay at the end
+            reach = float(reach_s[v])
+            low = np.searchsorted(piece.from_s, edges[:-1] - reach, side="right") - 1
+            high = np.searchsorted(piece.from_s, edges[1:] + reach, side="left") - 1
+            high[-1] = np.searchsorted(piece.from_s, edges[-1] + reach, side="right") - 1  # with the stay at the end
             low, high = np.maximum(low, 0), np.maximum(high, 0)
             speed = np.sqrt((piece.velocity**2).sum(axis=1))
             fastest[v] = _largest(speed, low, high)
             first[v], last[v], offset[v] = low + total, high + total, total
             total += len(speed)
             parts.append(piece)
-        pieces = Pieces(
-            np.concatenate([p.from_s for p in parts]),
-            np.concatenate([p.to_s for p in parts]),
-            np.concatenate([p.places for p in parts]),
-            np.concatenate([p.velocity for p in parts]),
-        )
+        pieces = _all(parts)
         begins = np.array([p.begin_s for p in paths])
         ends = np.array([FOREVER_S if p.ends_in_air else p.end_s for p in paths])
-        return cls(tuple(paths), window_s, edges, pieces, offset, nodes, stray, fastest, begins, ends, first, last)
+        return cls(
+            tuple(paths), window_s, reach_s, edges, pieces, offset, nodes, stray, fastest, begins, ends, first, last
+        )
 
     def bounds(self, i: Indices, j: Indices) -> tuple[Floats, Floats]:
         """For pairs (M,): a lower bound in each slice (M, K), and the least distance at the slices' ends (M,), metres.
 
         Both are inf where the two are not in the air together.
         """
-        edges = self.edges_s
-        w = self.window_s
+        edges, reach = self.edges_s, self.reach_s
         begin, end = np.maximum(self.begins[i], self.begins[j]), np.minimum(self.ends[i], self.ends[j])
         count, slices = len(i), self.stray.shape[1]
         square, cross, speed2 = np.zeros((count, slices + 1)), np.zeros((count, slices)), np.zeros((count, slices))
@@ -266,17 +300,21 @@ class Fleet:
         rounding = 4e-15 * np.maximum(square[:, :-1], square[:, 1:])
         least2 = np.maximum(square[:, :-1] + part * (2.0 * cross + part * speed2) - rounding, 0.0)
         bound = np.sqrt(least2) - self.stray[i] - self.stray[j]
-        if w > 0.0:
-            bound -= w * (self.fastest[i] + self.fastest[j])
-        shared = (edges[None, :-1] <= (end + w)[:, None]) & (edges[None, 1:] >= (begin - w)[:, None])
+        if (reach > 0.0).any():
+            bound -= reach[i, None] * self.fastest[i] + reach[j, None] * self.fastest[j]
+        first = np.maximum(self.begins[i] - reach[i], self.begins[j] - reach[j])
+        last = np.minimum(self.ends[i] + reach[i], self.ends[j] + reach[j])
+        shared = (edges[None, :-1] <= last[:, None]) & (edges[None, 1:] >= first[:, None])
         known = (edges >= begin[:, None]) & (edges <= end[:, None])
         seen = np.where(known, square, np.inf).min(axis=1)
-        return np.where(shared & (begin <= end + 2.0 * w)[:, None], bound, np.inf), np.sqrt(seen)
+        if self.pieces.drifts is not None:  # two that drift need not be at two places of the time table at once
+            seen[:] = np.inf
+        return np.where(shared & (first <= last)[:, None], bound, np.inf), np.sqrt(seen)
 
-    def rows(self, i: Indices, j: Indices, k: Indices) -> Iterator[tuple[Indices, Indices, Indices]]:
-        """All pairs of overlapping pieces of vehicles ``i`` and ``j`` in slices ``k`` (n,), in blocks.
+    def rows(self, i: Indices, j: Indices, k: Indices) -> Iterator[tuple[Indices, Indices, Indices, Apart]]:
+        """All pairs of pieces of vehicles ``i`` and ``j`` in slices ``k`` (n,) that may overlap in time, in blocks.
 
-        Each block has the row numbers among the n, and the numbers of the two pieces.
+        Each block has the row numbers among the n, the numbers of the two pieces, and how far their times may differ.
         """
         many_i = self.last[i, k] - self.first[i, k] + 1
         many_j = self.last[j, k] - self.first[j, k] + 1
@@ -289,14 +327,16 @@ class Fleet:
             local = np.arange(len(of)) - (np.concatenate([[0], total])[of] - done)
             a = self.first[i[of], k[of]] + local // many_j[of]
             b = self.first[j[of], k[of]] + local % many_j[of]
-            keep = overlap_of(self.pieces, a, b, 2.0 * self.window_s)
-            yield of[keep], a[keep], b[keep]
+            apart = self.pieces.apart_s(a, self.pieces, b, self.window_s)
+            keep = overlap_of(self.pieces, a, b, apart)
+            low, high = (x if np.ndim(x) == 0 else np.asarray(x)[keep] for x in apart)
+            yield of[keep], a[keep], b[keep], (low, high)
             start = stop
 
     def least(self, i: Indices, j: Indices, cut_m: float = np.inf) -> Least:
         """The least distance of pairs (M,), exact wherever it is below ``cut_m``."""
         out = Least.none(len(i))
-        w = 2.0 * self.window_s
+        w = self.reach_s[i] + self.reach_s[j]
         meet = np.flatnonzero((self.begins[i] <= self.ends[j] + w) & (self.begins[j] <= self.ends[i] + w))
         block = max(1, ROWS_AT_ONCE // self.stray.shape[1])
         for start in range(0, len(meet), block):
@@ -315,10 +355,10 @@ class Fleet:
         return out
 
     def _look(self, i: Indices, j: Indices, pair: Indices, k: Indices, numbers: Indices, out: Least) -> None:
-        for of, a, b in self.rows(i[pair], j[pair], k):
+        for of, a, b, apart in self.rows(i[pair], j[pair], k):
             if not len(of):
                 continue
-            distance, t1, t2 = nearest(self.pieces.take(a), self.pieces.take(b), 2.0 * self.window_s)
+            distance, t1, t2 = nearest(self.pieces.take(a), self.pieces.take(b), apart)
             owner = numbers[pair[of]]  # sorted
             heads = np.flatnonzero(np.concatenate([[True], np.diff(owner) > 0]))
             least = np.repeat(np.minimum.reduceat(distance, heads), np.diff(np.append(heads, len(owner))))
@@ -354,16 +394,38 @@ class Least:
 
 def pieces_of(path: TimedPath) -> Pieces:
     """The pieces of a motion. If it ends in the air, a last piece that does not move is added."""
-    times, points = path.times_s, path.points
+    times, points, drifts = path.times_s, path.points, path.drifts
+    if drifts is not None and path.ends_in_air:
+        drifts = drifts.take(np.append(np.arange(len(times) - 1), len(times) - 2))
     if path.ends_in_air:
         times, points = np.append(times, FOREVER_S), np.vstack([points, points[-1:]])
     velocity = np.diff(points, axis=0) / np.diff(times)[:, None]
-    return Pieces(times[:-1], times[1:], points[:-1], velocity)
+    return Pieces(times[:-1], times[1:], points[:-1], velocity, drifts)
 
 
-def overlap_of(pieces: Pieces, a: Indices, b: Indices, apart_s: float) -> Bools:
+def reach_of(path: TimedPath, window_s: float) -> float:
+    """How far a motion may be from its time table, s."""
+    return window_s if path.drifts is None else max(window_s, path.drifts.most_s)
+
+
+def overlap_of(pieces: Pieces, a: Indices, b: Indices, apart_s: Apart) -> Bools:
     """Whether two pieces each overlap in time, by their times alone."""
-    return np.asarray((pieces.from_s[a] <= pieces.to_s[b] + apart_s) & (pieces.from_s[b] <= pieces.to_s[a] + apart_s))
+    least, most = apart_s
+    return np.asarray((pieces.from_s[a] <= pieces.to_s[b] + most) & (pieces.from_s[b] <= pieces.to_s[a] - least))
+
+
+def _all(parts: Sequence[Pieces]) -> Pieces:
+    """The pieces of all vehicles in turn."""
+    drifts = None
+    if any(p.drifts is not None for p in parts):
+        each = [Drifts.none(len(p.from_s)) if p.drifts is None else p.drifts for p in parts]
+        count = max(len(d.early) for d in each)
+        each = [d.wide(count) for d in each]
+        drifts = Drifts(*(np.concatenate([getattr(d, name) for d in each], axis=1) for name in ("early", "late")))
+    return Pieces(
+        np.concatenate([p.from_s for p in parts]), np.concatenate([p.to_s for p in parts]),
+        np.concatenate([p.places for p in parts]), np.concatenate([p.velocity for p in parts]), drifts,
+    )  # fmt: skip
 
 
 def _edges(paths: Sequence[TimedPath], window_s: float) -> Floats:

@@ -14,9 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Indices
-from gcsplan.fleet._sweep import Pieces, pieces_of, shifts
+from gcsplan.fleet._sweep import Pieces, pieces_of, reach_of, shifts
 from gcsplan.fleet.motion.timing import TimedPath
 from gcsplan.fleet.separation import TOLERANCE_M, Rules
+from gcsplan.wind.drift import Drifts, between
 
 GROUP, LEVELS = 6, 3
 """Boxes per group, and levels of groups: groups that do not touch are skipped as a whole."""
@@ -135,6 +136,7 @@ class Taken:
         self._first: list[int] = []  # first piece of each vehicle; below, its first box
         self._first_box: list[int] = []
         self._levels = Boxes(np.zeros((0, 4)), np.zeros((0, 4))).levels()
+        self._reach_s = rules.window_s  # the largest of all
 
     def add(self, path: TimedPath) -> None:
         """Give ``path`` priority over all that come later."""
@@ -146,6 +148,7 @@ class Taken:
         self._levels = tuple(all_.joined(new) for all_, new in zip(self._levels, levels, strict=True))
         row = [*path.points[0, :2], *path.points[-1, :2], path.begin_s, path.end_s, float(self._lands(path))]
         self._pads = np.vstack([self._pads, row])
+        self._reach_s = max(self._reach_s, reach_of(path, self.rules.window_s))
         self.paths.append(path)
 
     def forbidden(self, path: TimedPath, low_s: float = 0.0, high_s: float = 0.0, spare_m: float = 0.0) -> Spans:
@@ -158,8 +161,7 @@ class Taken:
         parts = [*self._in_the_air(path, low_s, high_s, needed_m), self._on_the_pads(path, needed_m)]
         low, high = (np.concatenate([p[k] for p in parts]).astype(np.float64) for k in (0, 1))
         who = np.concatenate([p[2] for p in parts]).astype(np.intp)
-        wider = 2.0 * self.rules.window_s + EDGE_S
-        low, high = low - wider, high + wider
+        low, high = low - EDGE_S, high + EDGE_S
         keep = (low <= high_s) & (high >= low_s)
         return Spans(low[keep], high[keep], who[keep])
 
@@ -168,7 +170,7 @@ class Taken:
     ) -> list[tuple[Floats, Floats, Indices]]:
         if not self.paths:
             return []
-        near, window = needed_m, 2.0 * self.rules.window_s
+        near, window = needed_m, self._reach_s + reach_of(path, self.rules.window_s)
         own = pieces_of(path)
         # Own boxes at any allowed shift, widened by the separation: whatever they do not touch is clear.
         less = np.array([near, near, near, window - low_s])
@@ -198,7 +200,8 @@ class Taken:
         b = box - np.asarray(self._first_box, dtype=np.intp)[who] + np.asarray(self._first, dtype=np.intp)[who]
         low, high = shifts(own.take(a), self._pieces.take(b), needed_m)
         met = low <= high
-        return low[met], high[met], who[met]
+        sooner, later = own.apart_s(a[met], self._pieces, b[met], self.rules.window_s)
+        return low[met] + sooner, high[met] + later, who[met]
 
     def _on_the_pads(self, path: TimedPath, needed_m: float) -> tuple[Floats, Floats, Indices]:
         """Spans of shifts in which one vehicle takes off or lands beside another that stands on the ground."""
@@ -209,17 +212,26 @@ class Taken:
         mine = self._lands(path)
         clear = self.rules.pad_clear_s
         rows: list[tuple[Bools, Floats, Floats]] = []
+        wide = 2.0 * self.rules.window_s
 
         def near(place: Floats, others: Floats) -> Bools:
             return np.asarray(np.hypot(others[:, 0] - place[0], others[:, 1] - place[1]) < needed_m)
 
+        def drifts(mine: Drifts, theirs: Sequence[Drifts]) -> tuple[Floats, Floats]:
+            each = [between(mine, one) for one in theirs]
+            low, high = np.array(each).reshape(-1, 2).T
+            return (np.minimum(low, -wide), np.maximum(high, wide)) if wide else (low, high)
+
         never = np.full(len(begins), math.inf)
         start, goal, begin, end = path.points[0], path.points[-1], path.begin_s, path.end_s
+        ended = [p.end_drifts for p in self.paths]
+        on_time = Drifts.none(1)  # nothing drifts before it takes off
         # In turn: another lands where this one waits and takes off; this one lands where another waits; both land.
-        rows.append((lands & near(start, goals), ends - begin, never))
+        rows.append((lands & near(start, goals), ends - begin + drifts(on_time, ended)[0], never))
         if mine:
-            rows.append((near(goal, starts), -never, begins - end))
-            rows.append((lands & near(goal, goals), ends - end - clear, ends - end + clear))
+            rows.append((near(goal, starts), -never, begins - end + drifts(path.end_drifts, [on_time] * len(ends))[1]))
+            sooner, later = drifts(path.end_drifts, ended)
+            rows.append((lands & near(goal, goals), ends - end - clear + sooner, ends - end + clear + later))
         who = np.concatenate([np.flatnonzero(hit) for hit, _, _ in rows])
         low = np.concatenate([a[hit] for hit, a, _ in rows])
         high = np.concatenate([b[hit] for hit, _, b in rows])

@@ -26,9 +26,10 @@ import numpy as np
 from gcsplan.arrays import Floats, Indices
 from gcsplan.errors import NoMission
 from gcsplan.fleet.motion.ardupilot import lean_needed_deg
-from gcsplan.fleet.motion.timing import Course, Route, speed_for
+from gcsplan.fleet.motion.timing import Course, Route, TimedPath, speed_for
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import DEFAULT_LEAN_DEG, LARGEST_LEAN_DEG, Autopilot, Vehicle, lean_for_deg, lean_words
+from gcsplan.wind.drift import Drift
 
 __all__ = ["WITHIN_S", "Clock", "Craft", "Crew", "Hold", "Longer", "Mode", "NoSchedule", "Schedule", "Slot", "schedule"]
 
@@ -160,10 +161,14 @@ def _assigned(
 
 @dataclass(frozen=True, slots=True)
 class Crew:
-    """One vehicle and its route."""
+    """One vehicle and its route. It flies at speeds of its range from ``least_m_s`` to ``most_m_s``. ``drift`` is its
+    flight's in the declared winds, at about the speed at which it flies; None: no wind changes a time."""
 
     vehicle: Vehicle
     route: Route
+    least_m_s: float = 0.0
+    most_m_s: float = math.inf
+    drift: Drift | None = None
 
     @property
     def name(self) -> str:
@@ -201,7 +206,9 @@ class Craft:
         self.crew, self.name = crew, crew.name
         self.vehicle = crew.vehicle
         self.course = Course(crew.route, crew.vehicle)
-        self.slowest_m_s, self.fastest_m_s = _float32_range(crew.vehicle.speed_min_m_s, crew.vehicle.speed_max_m_s)
+        most_m_s = max(min(crew.vehicle.speed_max_m_s, crew.most_m_s), crew.vehicle.speed_min_m_s)
+        least_m_s = min(max(crew.vehicle.speed_min_m_s, crew.least_m_s), most_m_s)
+        self.slowest_m_s, self.fastest_m_s = _float32_range(least_m_s, most_m_s)
         self.fast_s = self.course.time_to_goal_s(self.fastest_m_s)
         self.slow_s = self.course.time_to_goal_s(self.slowest_m_s)
 
@@ -231,6 +238,10 @@ class Craft:
         joules = self.crew.route.energy_j(self.vehicle, hold_s, moving_s)
         all_notes = (*notes, *_speed_notes(self.vehicle, speed))
         return Slot(self.name, depart_s, hold_s, speed, arrive_s, joules, self.crew.route, all_notes)
+
+    def motion(self, slot: Slot) -> TimedPath:
+        """The motion of a slot, with its drifts in the declared winds."""
+        return self.course.fly(slot.speed_m_s, slot.depart_s, slot.hold_s).drifting(self.crew.drift)
 
     def at(self, arrive_s: float, hold: Hold = "ground", longer: Longer | None = None) -> Slot | None:
         """The slot that arrives at ``arrive_s``: at a lower speed, else at its slowest, with waiting as allowed.
@@ -270,7 +281,7 @@ class Craft:
             route = longer(self.name, length_m)
             if route is None:
                 return None
-            other = Craft(Crew(self.vehicle, route))
+            other = Craft(replace(self.crew, route=route))
             if other.fast_s - WITHIN_S <= arrive_s <= other.slow_s + WITHIN_S:
                 more_m = route.length_m - self.crew.route.length_m
                 slot = other.at(arrive_s, "none")

@@ -176,7 +176,7 @@ def resolve(  # noqa: PLR0913 - options by name, each with a default
 def _refuse_goals(plan: Schedule, job: Job, where: Where) -> None:
     """Refuse at once if two goals are so near that no departure, speed or path can help."""
     crews, rules = job.crews, job.rules
-    vehicles = {c.name: c.vehicle for c in crews}
+    by_name = {c.name: c for c in crews}
     slots, needed = plan.slots, rules.needed_m - TOLERANCE_M
     goals = np.array([s.route.points[-1] for s in slots])
     first, second = np.triu_indices(len(slots), 1)
@@ -194,7 +194,7 @@ def _refuse_goals(plan: Schedule, job: Job, where: Where) -> None:
             why = "both land there and stay"
         else:
             continue
-        pair = [motion_of(s, Crew(vehicles[s.name], s.route)) for s in (a, b)]
+        pair = [motion_of(s, replace(by_name[s.name], route=s.route)) for s in (a, b)]
         conflicts = separation(pair, rules).conflicts
         if not conflicts:
             continue
@@ -337,7 +337,7 @@ def least_interval_s(
         two = [c for c in crews if c.name in between]
         found = least_interval_s(pair, two, rules, hold=hold, later_s=later_s, between=between)
         return None if found is None else rounded_up(found / apart)
-    current = [Crew(c.vehicle, plan.of(c.name).route) for c in crews]
+    current = [replace(c, route=plan.of(c.name).route) for c in crews]
     job = Job(current, rules, None, hold, later_s)
     make = again or maker(plan, current, hold)
 
@@ -396,12 +396,12 @@ def least_goals_m(
     """
     rules = with_leaving(rules, plan)
     pair = _pair(plan, between)
-    own = [Crew(c.vehicle, plan.of(c.name).route) for c in crews if c.name in between]
+    own = [replace(c, route=plan.of(c.name).route) for c in crews if c.name in between]
     still = next(c.route.points[-1] for c in own if c.name == between[0])
     distance = rules.needed_m
     while distance <= 10.0 * rules.needed_m:
         tenths = rounded_up(distance)
-        moved = [c if c.name == between[0] else Crew(c.vehicle, _ended(c.route, still, tenths)) for c in own]
+        moved = [c if c.name == between[0] else replace(c, route=_ended(c.route, still, tenths)) for c in own]
         try:
             anew = maker(pair, moved, hold)(pair.interval_s)
             if not settle(anew, Job(moved, rules, None, hold, later_s)).stuck:

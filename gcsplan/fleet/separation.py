@@ -19,6 +19,7 @@ from gcsplan.errors import InputError
 from gcsplan.fleet._sweep import Fleet, Least, below, nearest
 from gcsplan.fleet.motion.timing import TimedPath
 from gcsplan.notes.note import Note
+from gcsplan.wind.drift import between
 
 AirPlace = tuple[float, float, float]
 Where = Callable[[AirPlace], Note]
@@ -40,8 +41,9 @@ class Rules:
     """The requested separation and the errors of the motions.
 
     ``separation_m`` holds between any two vehicles. Each of them may be ``error_m`` away from its modelled position,
-    and up to ``window_s`` early or late, independently of the others. A landed vehicle stays where it landed for
-    ``pad_clear_s`` (inf: for good). Vehicles in ``leaving`` fly away where their motion ends, so they stand nowhere.
+    and up to ``window_s`` early or late, independently of the others; a motion that drifts may also be as early or late
+    as the declared winds make it. A landed vehicle stays where it landed for ``pad_clear_s`` (inf: for good).
+    Vehicles in ``leaving`` fly away where their motion ends, so they stand nowhere.
     """
 
     separation_m: float
@@ -194,15 +196,15 @@ def in_the_air(pairs: Pairs, rules: Rules) -> list[Conflict]:
     needed = rules.needed_m - TOLERANCE_M
     bad = np.flatnonzero(pairs.least.distance_m < needed)
     found: list[Conflict] = []
-    fleet, w = pairs.fleet, pairs.fleet.window_s
+    fleet, w = pairs.fleet, float(pairs.fleet.reach_s.max())
     for m in bad.tolist():
         i, j = pairs.i[m : m + 1], pairs.j[m : m + 1]
         bound, _ = fleet.bounds(i, j)
         k = np.flatnonzero(bound[0] < needed)
         spans: list[tuple[float, float, float, float, float, int, int]] = []
-        for _, a, b in fleet.rows(np.repeat(i, len(k)), np.repeat(j, len(k)), k):
+        for _, a, b, apart in fleet.rows(np.repeat(i, len(k)), np.repeat(j, len(k)), k):
             pa, pb = fleet.pieces.take(a), fleet.pieces.take(b)
-            distance, t1, t2 = nearest(pa, pb, 2.0 * w)
+            distance, t1, t2 = nearest(pa, pb, apart)
             if w > 0.0:
                 first, last = np.maximum(pa.from_s, pb.from_s) - w, np.minimum(pa.to_s, pb.to_s) + w
                 close = distance < needed
@@ -243,7 +245,10 @@ def on_the_pads(paths: Sequence[TimedPath], rules: Rules) -> list[Conflict]:
     begins, ends = np.array([p.begin_s for p in paths]), np.array([p.end_s for p in paths])
     starts, goals = np.array([p.points[0] for p in paths]), np.array([p.points[-1] for p in paths])
     landing = np.array([not p.ends_in_air and p.name not in rules.leaving for p in paths])
-    needed, apart = rules.needed_m - TOLERANCE_M, 2.0 * rules.window_s
+    needed, wide = rules.needed_m - TOLERANCE_M, 2.0 * rules.window_s
+    # A landing's drift counts beside a take-off, which has none, and beside another landing's in the same wind.
+    early, late = np.array([(p.end_drifts.early.min(), p.end_drifts.late.max()) for p in paths]).T
+    early, late = (np.minimum(early, -wide), np.maximum(late, wide)) if wide else (early, late)
 
     def near(a: Floats, b: Floats) -> Bools:
         d = a[:, None, :2] - b[None, :, :2]
@@ -253,15 +258,16 @@ def on_the_pads(paths: Sequence[TimedPath], rules: Rules) -> list[Conflict]:
 
     cleared = ends + rules.pad_clear_s
     # [y, x]: vehicle y moves, vehicle x stands.
-    stands = landing[None, :] & (begins[:, None] >= ends[None, :] - apart) & (begins[:, None] < cleared[None] + apart)
-    leaves_beside = near(starts, goals) & stands
+    stands = landing[None, :] & (begins[:, None] >= (ends + early)[None, :])
+    leaves_beside = near(starts, goals) & stands & (begins[:, None] < (cleared + late)[None])
     later = ends[:, None] - ends[None, :]
     order = np.arange(len(paths))
     second = (later > 0.0) | ((later == 0.0) & (order[:, None] > order[None, :]))
-    stands = landing[None, :] & landing[:, None] & second & (ends[:, None] < cleared[None] + apart)
-    lands_beside = near(goals, goals) & stands
-    waits = landing[:, None] & (ends[:, None] <= begins[None, :] + apart)
-    lands_before = near(goals, starts) & waits
+    lands_beside = near(goals, goals) & landing[None, :] & landing[:, None] & second
+    for y, x in np.argwhere(lands_beside).tolist():
+        most_s = max(float(between(paths[y].end_drifts, paths[x].end_drifts)[1][0]), wide)
+        lands_beside[y, x] = ends[y] < cleared[x] + most_s
+    lands_before = near(goals, starts) & landing[:, None] & ((ends + early)[:, None] <= begins[None, :])
 
     def conflict(
         kind: ConflictKind, y: int, x: int, place: Floats, stand: Floats, time_s: float, until: float

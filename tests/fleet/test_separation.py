@@ -205,7 +205,7 @@ def test_two_straight_pieces_come_no_nearer_on_any_grid_than_in_closed_form(seed
     at_a = a.places[0] + (t1[ok] - a.from_s[0])[:, None] * a.velocity[0]
     at_b = b.places[0] + (t2[ok] - b.from_s[0])[:, None] * b.velocity[0]
     brute = float(np.linalg.norm(at_a - at_b, axis=1).min())
-    least, s1, s2 = nearest(a, b, w)
+    least, s1, s2 = nearest(a, b, (-w, w))
     between = float(np.linalg.norm(a.velocity) + np.linalg.norm(b.velocity)) * 3.0 / 300.0
     assert brute - 2.0 * between - 1e-9 <= least[0] <= brute + 1e-9
     assert abs(s1[0] - s2[0]) <= w + 1e-9

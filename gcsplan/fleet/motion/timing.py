@@ -23,6 +23,7 @@ from gcsplan.fleet.motion.ardupilot import Curved, curved
 from gcsplan.fleet.motion.px4 import Smoothed, smoothed
 from gcsplan.fleet.motion.speeds import POSITION_ERROR_M, Segments, column, rounded
 from gcsplan.vehicle import Autopilot, MissionEnd, Vehicle
+from gcsplan.wind.drift import Drift, Drifts
 from gcsplan.world.geodesy.atmosphere import true_per_indicated
 
 
@@ -34,7 +35,7 @@ class TimedPath:
     and amsl_m at those times. Before the first and after the last time the vehicle stands on the ground at its first or
     last point (with ``ends_in_air`` it stays at its last point for good). ``arrive_s`` is the time at which it reaches
     the goal at approach_agl_m. ``pieces`` (N - 1,) is the caller's number of each piece (its wire item), -1 if there is
-    none.
+    none. ``drifts`` (of N - 1 pieces): how much earlier or later each is in the declared winds; None: not at all.
     """
 
     name: str
@@ -43,6 +44,7 @@ class TimedPath:
     arrive_s: float
     ends_in_air: bool = False
     pieces: Indices | None = None
+    drifts: Drifts | None = None
 
     def __post_init__(self) -> None:
         if self.times_s.ndim != 1 or self.points.shape != (len(self.times_s), 3) or len(self.times_s) < 2:
@@ -67,9 +69,23 @@ class TimedPath:
 
     def delayed(self, by_s: float) -> TimedPath:
         """The same motion, ``by_s`` seconds later."""
-        return TimedPath(
-            self.name, self.times_s + by_s, self.points, self.arrive_s + by_s, self.ends_in_air, self.pieces
-        )
+        return replace(self, times_s=self.times_s + by_s, arrive_s=self.arrive_s + by_s)
+
+    def drifting(self, drift: Drift | None) -> TimedPath:
+        """The same motion with its drifts, cut where they change; itself if no wind changes a time."""
+        if drift is None or not drift.moves or self.pieces is None:
+            return self
+        times_s = drift.cut(self.times_s, self.pieces)
+        of = np.searchsorted(self.times_s, times_s[:-1], side="right") - 1
+        return replace(
+            self, times_s=times_s, points=self.at(times_s), pieces=self.pieces[of],
+            drifts=drift.along(times_s, self.pieces[of]),
+        )  # fmt: skip
+
+    @property
+    def end_drifts(self) -> Drifts:
+        """The drift with which the motion ends (1 of them)."""
+        return Drifts.none(1) if self.drifts is None else self.drifts.take(np.array([-1]))
 
 
 __all__ = [
