@@ -67,7 +67,9 @@ VEHICLE_PLAN = an_object(
 FLEET = an_object(
     {"mode": TEXT, "order": listed(TEXT), "min_separation_m": MAYBE_NUMBER,
      "closest": {"anyOf": [an_object({"vehicles": listed(TEXT), "time_s": NUMBER}), {"type": "null"}]}},
-    {"interval_s": MAYBE_NUMBER, "separation_m": MAYBE_NUMBER},
+    {"interval_s": MAYBE_NUMBER, "separation_m": MAYBE_NUMBER, "in_every_wind": FLAG,
+     "intervals": listed(an_object({"first": TEXT, "second": TEXT, "requested_s": NUMBER, "least_s": NUMBER,
+                                    "most_s": NUMBER}))},
 )  # fmt: skip
 VIOLATION = an_object(
     {"seq": {"type": ["integer", "null"]}, "kind": TEXT, "message": TEXT},

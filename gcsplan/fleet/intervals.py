@@ -23,19 +23,19 @@ AGREES_S = 1e-3
 class Interval:
     """How long after the first of two vehicles the second arrives at least and at most, over all winds, s.
 
-    ``wanted_s``: as the mission file requests.
+    ``requested_s``: as the mission file requests.
     """
 
     first: str
     second: str
-    wanted_s: float
+    requested_s: float
     least_s: float
     most_s: float
 
     @property
     def off_s(self) -> float:
         """By how much it differs from the requested one at most, s."""
-        return max(self.wanted_s - self.least_s, self.most_s - self.wanted_s)
+        return max(self.requested_s - self.least_s, self.most_s - self.requested_s)
 
     @property
     def width_s(self) -> float:
@@ -48,34 +48,34 @@ class Interval:
         return ordered and self.off_s <= window_s + AGREES_S
 
 
-def intervals(wanted: Schedule, slots: Sequence[Slot], drifts: Mapping[str, Drifts]) -> list[Interval]:
-    """Of neighbours in a sequence, in its order; of each two vehicles that are to arrive together; else none.
+def intervals(requested: Schedule, slots: Sequence[Slot], drifts: Mapping[str, Drifts]) -> list[Interval]:
+    """The intervals of neighbours in a sequence, in its order, or of each two that are to arrive together; else none.
 
-    ``wanted`` has the arrivals that are requested, ``slots`` are flown; ``drifts``: of each vehicle's arrival (1).
+    ``requested`` has the arrivals that are requested, ``slots`` are flown; ``drifts``: of each vehicle's arrival (1).
     """
-    turn_s = {slot.name: slot.arrive_s for slot in wanted.slots}
+    turn_s = {slot.name: slot.arrive_s for slot in requested.slots}
     table_s = {slot.name: slot.arrive_s for slot in slots}
-    names = [slot.name for slot in wanted.slots if slot.name in table_s]
-    pairs = pairwise(names) if wanted.mode == "sequence" else combinations(names, 2)
+    names = [slot.name for slot in requested.slots if slot.name in table_s]
+    pairs = pairwise(names) if requested.mode == "sequence" else combinations(names, 2)
     found = []
-    for a, b in pairs if wanted.mode != "none" else ():
+    for a, b in pairs if requested.mode != "none" else ():
         low, high = between(drifts[a], drifts[b])
         least_s, most_s = (table_s[b] - table_s[a] + float(s[0]) for s in (low, high))
         found.append(Interval(a, b, turn_s[b] - turn_s[a], least_s, most_s))
     return found
 
 
-def centred(wanted: Schedule, plan: Schedule, drifts: Mapping[str, Drifts], *, later: bool = True) -> Schedule:
-    """``plan`` with the departures at which each interval is as much too long in some wind as too short in another.
+def centred(requested: Schedule, plan: Schedule, drifts: Mapping[str, Drifts], *, later: bool = True) -> Schedule:
+    """``plan`` with the departures at which each interval is as much too long in one wind as too short in another.
 
-    ``wanted`` has the arrivals that are requested. With ``later`` all leave later if one would leave before the common
+    ``requested`` has the arrivals of the request. With ``later`` all leave later if one would leave before the common
     start; otherwise no vehicle leaves earlier.
     """
     if plan.mode == "none" or not plan.slots:
         return plan
-    turn_s = {slot.name: slot.arrive_s for slot in wanted.slots}
+    turn_s = {slot.name: slot.arrive_s for slot in requested.slots}
     slots = {slot.name: slot for slot in plan.slots}
-    names = [slot.name for slot in wanted.slots if slot.name in slots]
+    names = [slot.name for slot in requested.slots if slot.name in slots]
     at_s = {names[0]: slots[names[0]].arrive_s}
     for before, name in pairwise(names):
         beside = before if plan.mode == "sequence" else names[0]

@@ -112,6 +112,13 @@ PLAN_TEXTS = {
     "schedule_in_every_wind": (
         "no declared wind changes the time of a leg, so the time table, its order and its separation hold in each"
     ),
+    "schedule_kept_in_winds": (
+        "the time table holds in every declared wind, one and the same for all vehicles unless it varies: the order, "
+        "intervals within {off_s:seconds.1 up}, and the separation"
+    ),
+    "speed_kept_in_wind": (
+        "{vehicle} flies at {speed_m_s:speed.2} at most, which it keeps over ground in every declared wind"
+    ),
     "schedule_in_still_air": (
         "the time table holds in still air alone: in the declared winds nothing keeps the vehicles apart or in their "
         "order; {overlapping} {overlapping:pair|pairs} of neighbouring arrivals may change places, with windows that "

@@ -98,7 +98,7 @@ def _within(winds: WindsAlong, clock: FlightClock, cells: Floats) -> list[TimeWi
 
 
 def _sums(found: SpeedBounds, winds: WindsAlong, clock: FlightClock) -> tuple[Floats, Floats, Floats, Floats]:
-    """Of K cells: speeds (K, 4, P) at their corners, (K, P) the highest, and bounds (K, 4, N) of the sums of lengths
+    """Speeds (K, 4, P) at the corners of K cells, (K, P) the highest, and bounds (K, 4, N) of the sums of lengths
     over speeds: with a mean of the corners' winds, a sum is between the same means of the two bounds."""
     most = winds.ability.most_m_s
     corner = np.fmax(found.corner_m_s, ADVANCES_M_S)  # whoever flies at all is so fast

@@ -8,13 +8,23 @@ resolved or refused. Of a fixed wing's flight the time table needs climb-out, gl
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from gcsplan.app.fleet.every_wind import (
+    NotInEveryWind,
+    SpeedRange,
+    at_speeds,
+    corners_cut_m,
+    drifts,
+    require_intervals,
+    steadier,
+    with_cures,
+)
 from gcsplan.app.fleet.reroute import Detours
 from gcsplan.app.fleet.start_time import SLACK_S, GateTime, gated
 from gcsplan.app.plan.flight_hours import within_hours
@@ -27,6 +37,7 @@ from gcsplan.check.motion.circles import PLANE_LOITER_RADIUS_M, circle_reach_m
 from gcsplan.check.verdict import LegFigures
 from gcsplan.errors import NoMission, heed_cancel
 from gcsplan.fleet.arrival import Craft, Crew, NoSchedule, Schedule, Slot, schedule
+from gcsplan.fleet.intervals import Interval, centred, intervals
 from gcsplan.fleet.motion.timing import Course, Route, TimedPath, motion_error_m
 from gcsplan.mission_file import ArrivalRequest
 from gcsplan.notes.note import Note
@@ -79,6 +90,8 @@ LATER_S = 600.0
 """Seconds by which all arrivals may be delayed to keep a fleet apart, if the mission file sets no arrival time."""
 SEPARATION_M = 30.0
 """Separation that is judged if the file has no `arrival`, m."""
+DRIFT_ROUNDS = 3
+"""Times that departures are chosen for the drifts of flights whose speeds then change."""
 MOST_CONFLICTS = 8
 """Most conflicts that a refusal or a note names."""
 
@@ -112,14 +125,16 @@ def finished(
 
 
 def _schedule_in_wind(flown: Sequence[VehiclePlan], fleet: FleetPlan) -> list[Note]:
-    """The note that a time table holds in every declared wind, because none changes a time; or in still air alone, with
-    the neighbours whose arrivals may change places."""
+    """The note on what the declared winds make of a time table: it holds in each, or nothing was requested of it."""
     placed = sorted(((fleet.slot(v.name), v.verdict) for v in flown), key=lambda one: one[0].arrive_s)
     known = [w for w in (verdict.arrive_window_s(slot) for slot, verdict in placed) if w is not None]
     if len(known) < 2:
         return []
-    if all(verdict.unmoved_by_wind for _, verdict in placed):
+    if fleet.in_every_wind and not any(drifts(v) for v in flown):
         return [Note("schedule_in_every_wind")]
+    if fleet.in_every_wind:
+        off_s = max((one.off_s for one in fleet.intervals), default=0.0)
+        return [Note("schedule_kept_in_winds", off_s=off_s)]
     over_s = [before[1] - after[0] for before, after in pairwise(known)]
     return [Note("schedule_in_still_air", overlapping=sum(s > 0.0 for s in over_s), most_s=max(*over_s, 0.0))]
 
@@ -133,24 +148,92 @@ def fleet_of(
     cannot arrive as requested, ``separation`` if they cannot keep apart; with ``leaving`` such vehicles may be left
     out, and the results are those of the others.
     """
-    world, arrival = brief.world, brief.source.arrival
     leaving = leaving or LeavingOut(allowed=False)
-    crews = [crew_of(v, world) for v in vehicles]
+    if brief.source.arrival is None or len(vehicles) < 2 or not any(drifts(v) for v in vehicles):
+        return _fleet_of(vehicles, brief, gate, leaving, {})
+
+    def again(tried: Sequence[VehiclePlan], terms: Brief) -> tuple[tuple[VehiclePlan, ...], FleetPlan]:
+        """As in still air; else at speeds at which the vehicles drift less."""
+        strict = LeavingOut(allowed=False)
+        speeds = {} if terms.source.arrival is None else steadier(tried, terms.source.arrival.hold)
+        try:
+            return _fleet_of(tried, terms, gate, strict, {})
+        except NoMission:
+            if not speeds:
+                raise
+        return _fleet_of(tried, terms, gate, strict, speeds)
+
+    try:
+        return again(vehicles, brief)
+    except NoMission as why:
+        if not leaving.allowed:
+            raise with_cures(why, vehicles, brief, again) from why
+    speeds = steadier(vehicles, brief.source.arrival.hold)
+    while True:
+        tried = LeavingOut(allowed=True, found=leaving.found)
+        try:
+            found = _fleet_of(vehicles, brief, gate, tried, speeds)
+        except NotInEveryWind as why:  # the sequence closes up
+            for name in sorted(why.names):
+                leaving.leave(name, why)
+            vehicles = [v for v in vehicles if v.name not in why.names]
+            leaving.require_some(vehicles)
+            continue
+        leaving.found = tried.found
+        return found
+
+
+def _fleet_of(
+    vehicles: Sequence[VehiclePlan], brief: Brief, gate: GateTime | None, leaving: LeavingOut,
+    speeds: Mapping[str, SpeedRange],
+) -> tuple[tuple[VehiclePlan, ...], FleetPlan]:  # fmt: skip
+    """`fleet_of`, with the ``speeds`` of some vehicles."""
+    world, arrival = brief.world, brief.source.arrival
+    crews = [_paced(crew_of(v, world), speeds.get(v.name, SpeedRange())) for v in vehicles]
     notes: list[Note] = []
+    requested = None
     if arrival is None:
         plan = schedule(crews, "none")
     else:
-        detours = Detours(vehicles, brief, rules_of(arrival, vehicles), lambda v: route_of(v, world))
-        plan, notes = _scheduled(crews, arrival, detours, leaving)
-        if len(plan.slots) > 1:
+        detours = Detours(vehicles, brief, rules_of(arrival, vehicles, world), lambda v: route_of(v, world))
+        requested, notes = _scheduled(crews, arrival, detours, leaving)
+        plan = requested
+        if any(drifts(v) for v in vehicles):
+            plan = _kept_in_wind(requested, vehicles, crews, brief, gate, detours, leaving)
+        elif len(plan.slots) > 1:
             plan = _kept_apart(plan, vehicles, crews, brief, arrival, detours, leaving)
         placed = {slot.name: slot for slot in plan.slots}
         vehicles = [detours.plan_of(v.name, placed[v.name].route) for v in vehicles if v.name in placed]
         crews = [crew_of(v, world) for v in vehicles]
     flown, slots = _timed(vehicles, crews, plan, brief, gate, leaving)
     leaving.require_some(flown)
+    flown, slots, motions, found = _judged(flown, slots, arrival, world, leaving)
+    if found is not None:
+        notes += found.notes
+        if not found.safe:
+            notes.append(Note("nothing_keeps_apart", met=too_near(found.conflicts, world)))
+    apart = _intervals(requested, flown, slots, arrival, gate)
+    if gate is not None:
+        notes.append(Note("gates_open", start_utc=f"{gate.start:%Y-%m-%d %H:%M:%S}", spare_s=SLACK_S))
+    notes += [
+        Note("speed_kept_in_wind", vehicle=v.name, speed_m_s=speeds[v.name].most_m_s)
+        for v in flown if v.name in speeds and not v.request.vehicle.keeps_airspeed
+    ]  # fmt: skip
+    names = {v.name for v in flown}
+    order = tuple(name for name in plan.order if name in names)
+    return tuple(flown), FleetPlan(
+        plan.mode, order, plan.interval_s, tuple(slots), tuple(motions), found, tuple(notes),
+        None if gate is None else gate.start, apart,
+        None if any(v.verdict.drift is None for v in flown) else arrival is not None or not any(map(drifts, flown)),
+    )  # fmt: skip
+
+
+def _judged(
+    flown: list[VehiclePlan], slots: list[Slot], arrival: ArrivalRequest | None, world: World, leaving: LeavingOut
+) -> tuple[list[VehiclePlan], list[Slot], list[TimedPath], Separation | None]:
+    """The vehicles that keep apart, with their slots, motions and separation. Raises NoMission."""
     motions = [motion_of(v, slot, world) for v, slot in zip(flown, slots, strict=True)]
-    found = _separation(motions, flown, arrival)
+    found = _separation(motions, flown, arrival, world)
     if found is not None and not found.safe and arrival is not None:
         # The missions as built are what is flown, so this check decides.
         if not leaving.allowed:
@@ -160,41 +243,81 @@ def fleet_of(
             leaving.leave(name, NoMission(str(too_near([conflict], world)), reason="separation"))
         rows = [k for k, v in enumerate(flown) if v.name not in leave]
         flown, slots, motions = [flown[k] for k in rows], [slots[k] for k in rows], [motions[k] for k in rows]
-        found = _separation(motions, flown, arrival)
-    if found is not None:
-        notes += found.notes
-        if not found.safe:
-            notes.append(Note("nothing_keeps_apart", met=too_near(found.conflicts, world)))
-    if gate is not None:
-        notes.append(Note("gates_open", start_utc=f"{gate.start:%Y-%m-%d %H:%M:%S}", spare_s=SLACK_S))
-    names = {v.name for v in flown}
-    order = tuple(name for name in plan.order if name in names)
-    return tuple(flown), FleetPlan(
-        plan.mode, order, plan.interval_s, tuple(slots), tuple(motions), found, tuple(notes),
-        None if gate is None else gate.start,
-    )  # fmt: skip
+        found = _separation(motions, flown, arrival, world)
+    return flown, slots, motions, found
 
 
-def without(fleet: FleetPlan, kept: Sequence[VehiclePlan], arrival: ArrivalRequest | None) -> FleetPlan:
+def _paced(crew: Crew, speeds: SpeedRange) -> Crew:
+    return replace(crew, least_m_s=speeds.least_m_s, most_m_s=speeds.most_m_s)
+
+
+def _kept_in_wind(
+    requested: Schedule, vehicles: Sequence[VehiclePlan], crews: Sequence[Crew], brief: Brief, gate: GateTime | None,
+    detours: Detours, leaving: LeavingOut,
+) -> Schedule:  # fmt: skip
+    """The schedule with its intervals in the middle of what the declared winds make of them, and kept apart in each.
+
+    Drifts depend on speeds, which change where vehicles are kept apart, so this is done again until nothing changes.
+    Raises NotInEveryWind if no departures of these flights keep the order and the intervals.
+    """
+    arrival = brief.source.arrival
+    assert arrival is not None
+    plan = requested
+    for _ in range(DRIFT_ROUNDS):
+        routes = {slot.name: slot.route for slot in plan.slots}
+        flown = at_speeds([detours.plan_of(name, route) for name, route in routes.items()], plan, brief)
+        if arrival.hold == "ground":
+            found = {name: v.verdict.arrival_drift for name, v in flown.items()}
+            plan = centred(requested, plan, found, later=arrival.arrive_s is None)
+            _intervals(requested, list(flown.values()), plan.slots, arrival, gate)
+        crews = [
+            replace(c, least_m_s=0.0, drift=flown[c.name].verdict.drift, route=routes[c.name])
+            for c in crews if c.name in flown
+        ]  # fmt: skip
+        before = {slot.name: (slot.speed_m_s, slot.route) for slot in plan.slots}
+        if len(plan.slots) > 1:
+            plan = _kept_apart(plan, vehicles, crews, brief, arrival, detours, leaving)
+        if all(before[slot.name] == (slot.speed_m_s, slot.route) for slot in plan.slots):
+            break
+    return plan
+
+
+def _intervals(
+    requested: Schedule | None, flown: Sequence[VehiclePlan], slots: Sequence[Slot], arrival: ArrivalRequest | None,
+    gate: GateTime | None,
+) -> tuple[Interval, ...]:  # fmt: skip
+    """The intervals over all declared winds; none in still air. Raises NotInEveryWind if they are not kept."""
+    if requested is None or arrival is None or all(v.verdict.drift is None for v in flown):
+        return ()
+    arrivals = {v.name: v.verdict.arrival_drift for v in flown}
+    found = intervals(requested, slots, arrivals)
+    if any(drifts(v) for v in flown):  # gates open at whole seconds
+        require_intervals(found, arrival.mode, arrival.window_s + (0.0 if gate is None else 1.0), arrivals)
+    return tuple(found)
+
+
+def without(fleet: FleetPlan, kept: Sequence[VehiclePlan], arrival: ArrivalRequest | None, world: World) -> FleetPlan:
     """The time table of the vehicles that are ``kept``; the turns of the others stay empty."""
     names = [v.name for v in kept]
     motions = tuple(fleet.motion(name) for name in names)
     return replace(
         fleet, order=tuple(name for name in fleet.order if name in names),
         slots=tuple(fleet.slot(name) for name in names), motions=motions,
-        separation=_separation(motions, kept, arrival),
+        separation=_separation(motions, kept, arrival, world),
+        intervals=tuple(one for one in fleet.intervals if {one.first, one.second} <= set(names)),
     )  # fmt: skip
 
 
 def _separation(
-    motions: Sequence[TimedPath], flown: Sequence[VehiclePlan], arrival: ArrivalRequest | None
+    motions: Sequence[TimedPath], flown: Sequence[VehiclePlan], arrival: ArrivalRequest | None, world: World
 ) -> Separation | None:
     heed_cancel()
     if len(flown) < 2:
         return None
     from gcsplan.fleet.separation import separation  # imported here because most plans have one vehicle
 
-    return separation(motions, rules_of(arrival, flown))
+    drifting = [motion.drifting(v.verdict.drift) for motion, v in zip(motions, flown, strict=True)]
+    return separation(drifting, rules_of(arrival, flown, world))
 
 
 def _timed(
@@ -268,11 +391,14 @@ def route_of(v: VehiclePlan, world: World) -> Route:
     )  # fmt: skip
 
 
-def rules_of(arrival: ArrivalRequest | None, vehicles: Sequence[VehiclePlan]) -> Rules:
+def rules_of(arrival: ArrivalRequest | None, vehicles: Sequence[VehiclePlan], world: World) -> Rules:
     """The requested separation, with the error of the modelled motions."""
     from gcsplan.fleet.separation import Rules
 
     error_m = max(motion_error_m(v.request.vehicle) + _circling_m(v) for v in vehicles)
+    error_m += max(
+        corners_cut_m(v, Course(route_of(v, world), v.request.vehicle)) if drifts(v) else 0.0 for v in vehicles
+    )
     leaving = frozenset(v.name for v in vehicles if v.request.end == "none")
     if arrival is None:
         return Rules(SEPARATION_M, error_m=error_m, leaving=leaving)
@@ -333,7 +459,7 @@ def _kept_apart(
     from gcsplan.fleet.resolve import resolve  # imported here because most plans have one vehicle
 
     settled = resolve(
-        plan, crews, rules_of(arrival, vehicles),
+        plan, crews, rules_of(arrival, vehicles, brief.world),
         priority=[name for name in arrival.order if name in plan.order] if brief.by_priority else None,
         hold=arrival.hold,
         later_s=0.0 if arrival.arrive_s is not None else LATER_S,

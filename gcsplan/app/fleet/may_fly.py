@@ -47,7 +47,7 @@ def flyable(
     if len(vehicles) == len(plan.vehicles):
         return plan, homes
     leaving.require_some(vehicles)
-    fleet = None if plan.fleet is None else without(plan.fleet, vehicles, plan.source.arrival)
+    fleet = None if plan.fleet is None else without(plan.fleet, vehicles, plan.source.arrival, plan.world)
     homes = {name: home for name, home in homes.items() if name not in gone}
     return replace(plan, vehicles=vehicles, fleet=fleet, left_out=tuple(leaving.found)), homes
 

@@ -207,7 +207,15 @@ def _fleet(plan: Plan) -> dict[str, Any]:
         "closest": {"vehicles": list(closest.vehicles), "time_s": closest.time_s} if closest else None,
         "interval_s": fleet.interval_s if fleet is not None and fleet.mode == "sequence" else None,
         "separation_m": arrival.separation_m if arrival is not None and several else None,
+        **_fleet_in_wind(fleet),
     }
+
+
+def _fleet_in_wind(fleet: FleetPlan | None) -> dict[str, Any]:
+    """Whether the time table holds in every declared wind, and the intervals between arrivals; empty in still air."""
+    if fleet is None or fleet.in_every_wind is None or len(fleet.slots) < 2:
+        return {}
+    return {"in_every_wind": fleet.in_every_wind, "intervals": [asdict(one) for one in fleet.intervals]}
 
 
 def _vehicle(

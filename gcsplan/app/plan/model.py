@@ -13,6 +13,7 @@ from gcsplan.app.plan.left_out import LeftOut
 from gcsplan.check.verdict import Verdict
 from gcsplan.errors import GcsplanError
 from gcsplan.fleet.arrival import Slot
+from gcsplan.fleet.intervals import Interval
 from gcsplan.fleet.motion.timing import TimedPath
 from gcsplan.mavlink.build.order import Order
 from gcsplan.mavlink.mission.mission import Mission
@@ -162,8 +163,9 @@ class VehiclePlan:
 class FleetPlan:
     """The time table of all vehicles. ``slots`` and ``motions`` are in the order of the plan's vehicles.
 
-    ``order`` is the order of arrival. ``separation`` is None for a single vehicle. ``start_utc``: the common start, if
-    it is a time of day.
+    ``order`` is the order of arrival. ``separation`` is None for a single vehicle; it counts every declared wind, as
+    ``intervals`` do, which are those between arrivals (none in still air). ``start_utc``: the common start, if it is a
+    time of day. ``in_every_wind``: whether all of it holds in every declared wind; None in still air.
     """
 
     mode: str
@@ -174,6 +176,8 @@ class FleetPlan:
     separation: Separation | None = None
     notes: tuple[Note, ...] = ()
     start_utc: datetime | None = None
+    intervals: tuple[Interval, ...] = ()
+    in_every_wind: bool | None = None
 
     def __repr__(self) -> str:
         return f"<FleetPlan {self.mode}: {len(self.slots)} vehicles>"

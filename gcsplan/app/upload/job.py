@@ -96,7 +96,8 @@ class FleetOnBoard:
 
     def __init__(self, plan: Plan) -> None:
         self._plan = plan
-        self._motions = {} if plan.fleet is None else {m.name: m for m in plan.fleet.motions}
+        drift = {v.name: v.verdict.drift for v in plan.vehicles}
+        self._motions = {} if plan.fleet is None else {m.name: m.drifting(drift[m.name]) for m in plan.fleet.motions}
         self._lock = threading.Lock()
 
     @property
@@ -117,12 +118,12 @@ class FleetOnBoard:
 
         planned = next(v for v in plan.vehicles if v.name == name)
         flown = replace(planned, request=replace(planned.request, vehicle=vehicle), verdict=verdict)
-        motion = motion_of(flown, plan.fleet.slot(name), plan.world)
+        motion = motion_of(flown, plan.fleet.slot(name), plan.world).drifting(verdict.drift)
         with self._lock:
             others = [m for m in self._motions.values() if m.name != name]
             self._motions[name] = motion
         kept = [flown if v.name == name else v for v in plan.vehicles]
-        found = separation([motion, *others], rules_of(plan.source.arrival, kept))
+        found = separation([motion, *others], rules_of(plan.source.arrival, kept, plan.world))
         met = [c for c in found.conflicts if name in c.worst.vehicles]
         return too_near(met, plan.world) if met else None
 

@@ -199,7 +199,7 @@ def _say_fleet(plan: Plan, units: Units) -> None:
     closest = fleet.closest
     if fleet.separation is None:
         return
-    still = " in still air" if any(note.code == "schedule_in_still_air" for note in plan.notes) else ""
+    still = {None: "", True: " in every declared wind", False: " in still air"}[fleet.in_every_wind]
     unit = units.distance
     needed = f" of {unit.stated(arrival.separation_m)} {unit.symbol} required" if arrival is not None else ""
     if closest is None:

@@ -322,11 +322,19 @@ def test_bad_arrivals_are_input_errors() -> None:
         planned({"mode": "sequence"})
 
 
-@pytest.mark.parametrize(("lean_deg", "note"), [(45, "schedule_in_every_wind"), (30, "schedule_in_still_air")])
-def test_a_time_table_holds_in_every_wind_only_where_none_changes_a_time(lean_deg: int, note: str) -> None:
-    arrival = {"mode": "sequence", "order": ["west", "south"], "interval_s": 20, "separation_m": 30}
+@pytest.mark.parametrize(("lean_deg", "slower"), [(45, 0), (30, 2)])
+def test_copters_give_up_speed_only_where_a_declared_wind_changes_a_time(lean_deg: int, slower: int) -> None:
     lean = {"lean_angle_deg": lean_deg}
-    done = planned(arrival, lean, lean, wind={"up_to_m_s": 4})
-    assert [n.code for n in done.notes if n.code.startswith("schedule_in")] == [note]
+    done = planned(sequence(20), lean, lean, wind={"up_to_m_s": 4})
+    codes = [n.code for n in done.notes]
+    assert codes.count("speed_kept_in_wind") == slower
+    assert "schedule_in_every_wind" in codes
     widths = [np.diff(v.verdict.leg_windows_s() or ((0.0, math.inf),)).max() for v in done.vehicles]
-    assert (max(widths) < 1e-6) == (note == "schedule_in_every_wind")
+    assert max(widths) < 1e-6
+    assert [round(one["least_s"], 3) for one in summary_of(done)["fleet"]["intervals"]] == [20.0]
+
+
+def test_a_fleet_that_asks_for_no_arrival_is_timed_in_still_air() -> None:
+    done = planned(None, {"lean_angle_deg": 30}, {"lean_angle_deg": 30}, wind={"up_to_m_s": 4})
+    assert "schedule_in_still_air" in [n.code for n in done.notes]
+    assert summary_of(done)["fleet"]["in_every_wind"] is False

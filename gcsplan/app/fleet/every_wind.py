@@ -1,0 +1,214 @@
+"""Time tables that hold in every declared wind: the speeds that vehicles keep in each, and what else would do.
+
+What a refusal reports is tried: the whole time table is made again with it, and judged.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gcsplan.app.plan.model import Brief, VehiclePlan
+from gcsplan.app.plan.problem import built
+from gcsplan.app.plan.vehicle import rebuilt
+from gcsplan.errors import NoMission
+from gcsplan.figures import floored, raised
+from gcsplan.fleet.arrival import Hold, Mode, Schedule
+from gcsplan.fleet.intervals import Interval
+from gcsplan.fleet.motion.timing import Course, flown_corners
+from gcsplan.wind.drift import Drifts
+
+__all__ = ["NotInEveryWind", "at_speeds", "corners_cut_m", "drifts", "require_intervals", "steadier", "with_cures"]
+
+MOST_TRIED = 6
+"""Most vehicles with which a refusal tries what would do."""
+CURE_TRIES = 3
+"""Winds, and intervals twice, that a refusal tries: up to the first that works, and then between."""
+INTERVAL_FACTOR = 2
+"""Factor from one interval that is tried to the next."""
+
+
+@dataclass(frozen=True, slots=True)
+class SpeedRange:
+    """Lowest and highest speeds with which a time table is begun; departures may then need others, but none higher."""
+
+    least_m_s: float = 0.0
+    most_m_s: float = math.inf
+
+
+Retimed = Callable[[Sequence[VehiclePlan], Brief], object]
+"""Makes the time table of vehicles again, under the terms of a brief; raises NoMission."""
+
+
+class NotInEveryWind(NoMission):
+    """The time table cannot be kept in some declared wind; ``window_s`` is the least that its flights could keep.
+
+    ``names`` are the vehicles that drift more than the ones beside them.
+    """
+
+    def __init__(self, message: str, window_s: float, names: frozenset[str]) -> None:
+        super().__init__(message, reason="time")
+        self.window_s, self.names = window_s, names
+
+
+def drifts(v: VehiclePlan) -> bool:
+    """Whether a declared wind changes a time of the vehicle's flight."""
+    return v.verdict.drift is not None and v.verdict.drift.moves
+
+
+def steadier(vehicles: Sequence[VehiclePlan], hold: Hold) -> dict[str, SpeedRange]:
+    """Ranges of speeds at which vehicles drift less, m/s; of the vehicles that have one.
+
+    A multicopter keeps its speed over ground in every wind up to some speed. A fixed wing drifts the less the faster it
+    is, and can wait on the ground instead.
+    """
+    found = {}
+    for v in vehicles:
+        blown, vehicle = v.verdict.in_wind, v.request.vehicle
+        if blown is None or not drifts(v):
+            continue
+        keeps_m_s = floored(blown.keeps_part * v.speed_m_s, 2)
+        if vehicle.keeps_airspeed and hold == "ground":
+            found[v.name] = SpeedRange(vehicle.speed_max_m_s, vehicle.speed_max_m_s)
+        elif vehicle.speed_min_m_s <= keeps_m_s < vehicle.speed_max_m_s:
+            found[v.name] = SpeedRange(0.0, keeps_m_s)
+    return found
+
+
+def at_speeds(vehicles: Sequence[VehiclePlan], plan: Schedule, brief: Brief) -> dict[str, VehiclePlan]:
+    """The vehicles' missions at the speeds of a schedule. One that may not fly is refused later, when it is timed."""
+    found = {}
+    slots = {slot.name: slot for slot in plan.slots}
+    for v in vehicles:
+        if v.name in slots:
+            slot = slots[v.name]
+            try:
+                found[v.name] = rebuilt(v, brief, speed_m_s=slot.speed_m_s, hold_s=slot.hold_s)
+            except NoMission:
+                found[v.name] = v
+    return found
+
+
+def corners_cut_m(v: VehiclePlan, course: Course) -> float:
+    """How far a multicopter's way may be from the one in still air: where it is slower it cuts its corners less."""
+    if not drifts(v) or v.verdict.in_wind is None or v.verdict.in_wind.vehicle.keeps_airspeed:
+        return 0.0
+    corners, points = flown_corners(course.route), course.fly(v.speed_m_s).points
+    a, along = corners[:-1], np.diff(corners, axis=0)
+    length2 = np.maximum((along**2).sum(axis=1), 1e-12)
+    part = np.clip(((points[:, None] - a) * along).sum(axis=2) / length2, 0.0, 1.0)
+    off = np.linalg.norm(points[:, None] - a - part[..., None] * along, axis=2)
+    return float(off.min(axis=1).max())
+
+
+def require_intervals(found: Sequence[Interval], mode: Mode, window_s: float, drifts_of: Mapping[str, Drifts]) -> None:
+    """Raise NotInEveryWind unless order and intervals hold in every wind; ``drifts_of``: the arrivals' by name."""
+    bad = [one for one in found if not one.kept(mode, window_s)]
+    if not bad:
+        return
+    worst = max(bad, key=lambda one: one.off_s)
+    least_s = max(one.width_s for one in found)
+    apart = f"{floored(worst.least_s, 1):.1f} to {raised(worst.most_s, 1):.1f} s"
+    request = f"{abs(round(worst.requested_s, 1)):g} s" + (
+        f" ± {window_s:g} s (window_s)" if window_s else " (window_s: 0)"
+    )
+    raise NotInEveryWind(
+        f"in the declared winds {worst.second} arrives {apart} after {worst.first}, requested are {request}", least_s,
+        frozenset(max(one.first, one.second, key=lambda name: drifts_of[name].most_s) for one in bad),
+    )  # fmt: skip
+
+
+def with_cures(why: NoMission, vehicles: Sequence[VehiclePlan], brief: Brief, again: Retimed) -> NoMission:
+    """The refusal with what would do, each tried: a wider window, a longer interval, lower speeds or a weaker wind."""
+    if len(vehicles) > MOST_TRIED or not (isinstance(why, NotInEveryWind) or why.reason == "separation"):
+        return why
+    found = [*_windows(why, vehicles, brief, again), *_speeds(vehicles, brief, again), *_winds(vehicles, brief, again)]
+    what = (
+        f"what works: {', or '.join(found)}"
+        if found
+        else "no window, interval, speed or weaker wind that was tried helps"
+    )
+    return NoMission(f"{why}; {what}", reason="time" if isinstance(why, NotInEveryWind) else "separation")
+
+
+def _works(again: Retimed, vehicles: Sequence[VehiclePlan], brief: Brief) -> bool:
+    try:
+        again(vehicles, brief)
+    except NoMission:
+        return False
+    return True
+
+
+def _windows(why: NoMission, vehicles: Sequence[VehiclePlan], brief: Brief, again: Retimed) -> list[str]:
+    """The smallest window, and with it, or with the present one, the smallest of the intervals that are tried."""
+    arrival = brief.source.arrival
+    assert arrival is not None
+    window_s = max(arrival.window_s, raised(why.window_s, 1) if isinstance(why, NotInEveryWind) else 0.0)
+    words = "" if window_s == arrival.window_s else f"window_s: {window_s:g}"
+
+    def works(interval_s: float) -> bool:
+        request = replace(arrival, window_s=window_s, interval_s=interval_s)
+        return _works(again, vehicles, _with(brief, arrival=request))
+
+    if words and works(arrival.interval_s):
+        return [words]
+    if arrival.mode != "sequence":
+        return []
+    bad, good = math.floor(arrival.interval_s), max(math.ceil(arrival.interval_s), math.ceil(2.0 * window_s)) + 1
+    for _ in range(CURE_TRIES):
+        if works(good):
+            break
+        bad, good = good, good * INTERVAL_FACTOR
+    else:
+        return []
+    for _ in range(CURE_TRIES):
+        middle = (good + bad) // 2
+        if middle == bad:
+            break
+        bad, good = (bad, middle) if works(middle) else (middle, good)
+    return [f"{words} with interval_s: {good}" if words else f"interval_s: {good}"]
+
+
+def _speeds(vehicles: Sequence[VehiclePlan], brief: Brief, again: Retimed) -> list[str]:
+    """The lower ends of speed ranges at which multicopters keep their speeds in every wind."""
+    slower, words = [], []
+    for v in vehicles:
+        blown, vehicle = v.verdict.in_wind, v.request.vehicle
+        keeps_m_s = math.inf if blown is None else floored(blown.keeps_part * v.speed_m_s, 1)
+        if 0.0 < keeps_m_s < vehicle.speed_min_m_s:
+            words.append(f"speed_m_s of {v.name} from {keeps_m_s:g}")
+            vehicle = replace(vehicle, speed_min_m_s=keeps_m_s)
+        slower.append(replace(v, request=replace(v.request, vehicle=vehicle)))
+    return [" and ".join(words)] if words and _works(again, slower, brief) else []
+
+
+def _winds(vehicles: Sequence[VehiclePlan], brief: Brief, again: Retimed) -> list[str]:
+    """The strongest of some weaker sets of winds of the same form."""
+    wind = brief.source.wind
+
+    def works(up_to_m_s: float) -> bool:
+        weaker = _with(brief, wind=wind.scaled(up_to_m_s / wind.strongest_m_s))
+        try:
+            tried = []
+            for v in vehicles:
+                mission, verdict = built(weaker, v.request, v.solution, v.order)
+                tried.append(replace(v, mission=mission, verdict=verdict))
+            again(tried, weaker)
+        except NoMission:
+            return False
+        return True
+
+    low_m_s, high_m_s = 0.0, wind.strongest_m_s
+    for _ in range(CURE_TRIES):
+        middle_m_s = floored(0.5 * (low_m_s + high_m_s), 1)
+        if middle_m_s <= low_m_s:
+            break
+        low_m_s, high_m_s = (middle_m_s, high_m_s) if works(middle_m_s) else (low_m_s, middle_m_s)
+    return [f"winds of at most {low_m_s:g} m/s, gusts included"] if low_m_s else []
+
+
+def _with(brief: Brief, **changes: object) -> Brief:
+    return replace(brief, source=replace(brief.source, **changes))  # type: ignore[arg-type]
