@@ -250,7 +250,7 @@ def test_what_the_numbers_are(capsys: pytest.CaptureFixture[str]) -> None:
     assert list(row) == [
         "vehicle", "items", "length, m", "above the bound, %", "energy, kJ", "energy, Wh", "energy, mAh", "battery, %",
         "lowest AGL, m", "highest AGL, m", "nearest zone, m", "over or under a zone, m", "steepest, °", "speed, m/s",
-        "departs", "arrives", "in the wind", "verdict",
+        "departs", "arrives", "within", "verdict",
     ]  # fmt: skip
     joules = v.verdict.energy_j
     assert number(row["energy, Wh"]) == pytest.approx(joules / 3600, abs=0.51)

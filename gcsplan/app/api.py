@@ -107,7 +107,7 @@ def check(
         for v in what.vehicles:
             again = judge(
                 v.mission, flies.get(v.name, v.request.vehicle), what.world, rtl_rel_home_m=v.request.rtl_rel_home_m,
-                terrain_error_m=source.terrain_error_m, wind=source.flight_wind,
+                terrain_error_m=source.terrain_error_m, wind=source.flight_wind(v.request),
             )  # fmt: skip
             flown.append(replace(v, verdict=again))
         return {v.name: v.verdict for v in (flown if what.fleet is None else within_hours(source, flown, what.fleet))}

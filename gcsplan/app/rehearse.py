@@ -70,7 +70,7 @@ def _part(planned: Plan, v: VehiclePlan) -> RehearsalPart:
         rtl_rel_home_m=request.rtl_rel_home_m,
         airborne=leaves and request.start_amsl_m is not None,
         leaves=leaves,
-        window_s=v.verdict.arrive_window_s(slot),
+        window_s=v.verdict.arrive_window_s(slot), depart_window_s=request.depart_window_s,
     )  # fmt: skip
 
 

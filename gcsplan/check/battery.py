@@ -105,7 +105,7 @@ def battery_home(verdict: Verdict, vehicle: Vehicle, home: Place, return_amsl_m:
         return None
     usable = (1.0 - energy.reserve) * energy.battery_j
     ways = None
-    if verdict.in_wind is not None:
+    if verdict.in_wind is not None and not verdict.in_wind.wind.still:
         highest_m = max(home[2], return_amsl_m, *(leg.end[2] for leg in verdict.legs))
         ways = WaysHome(vehicle, verdict.in_wind.flies_in, (home[2], highest_m))
 

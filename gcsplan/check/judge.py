@@ -95,9 +95,10 @@ def judge(
     if times or wind or flight.loop_seq is not None or vehicle.energy.base_w:  # the battery depends on them
         clock = FlightTimes(flight.stretches, vehicle, world, home, radius_m)
         seconds = clock.seconds()
-        if wind is not None and not wind.declared.still and _judged_in_wind(flight, vehicle):
+        if wind is not None and (not wind.declared.still or wind.late_s) and _judged_in_wind(flight, vehicle, wind):
             blown = FlightInWind(flight.stretches, clock, vehicle, wind, _agl_m(plane, report, len(flight.stretches)))
-    costs = None if blown is None or blown.too_windy is not None else blown.costs_so_far
+    windy = blown is not None and blown.too_windy is None and not blown.wind.still
+    costs = blown.costs_so_far if blown is not None and windy else None
     figures = _figures(flight, plane, report, vehicle, world, seconds, costs)
     findings += _blown_away(blown)
     findings += _findings(flight.stretches, plane, report, vehicle.limits, world)
@@ -114,6 +115,8 @@ def judge(
     if any(s.terrain for s in flight.stretches):
         flight.notes.append(Note("reads_terrain_on_board", spacing_m=world.post_spacing_m, error_m=terrain_error_m))
     flight.notes += _terms(mission, vehicle, in_wind=costs is not None)
+    if wind is not None and wind.late_s:
+        flight.notes.append(Note("departs_late", late_s=wind.late_s))
     verdict = Verdict(
         mission, figures, tuple(findings), tuple(flight.not_judged), tuple(flight.notes), misses=near, zone_pass=over,
         energy_stated=vehicle.energy.stated, paper_energy=vehicle.energy.papers,
@@ -123,9 +126,9 @@ def judge(
     return _with_battery(verdict, vehicle, flight, costs)
 
 
-def _judged_in_wind(flight: Flight, vehicle: Vehicle) -> bool:
+def _judged_in_wind(flight: Flight, vehicle: Vehicle, wind: FlightWind) -> bool:
     """Whether it is known what the vehicle does in a wind; why not, if not."""
-    if vehicle.autopilot is Autopilot.ARDUPLANE and not vehicle.keeps_airspeed:
+    if not wind.declared.still and vehicle.autopilot is Autopilot.ARDUPLANE and not vehicle.keeps_airspeed:
         flight.not_judged.append(Note("vtol_in_wind"))
         return False
     return True

@@ -55,7 +55,8 @@ class VehicleRequest:
     ``start``, ``goal`` are east_m, north_m and the AMSL metres of the *ground* there; ``start_deg``, ``goal_deg`` are
     the same as (latitude, longitude), as written. ``start_amsl_m``, ``goal_amsl_m`` are their altitudes if they are in
     the air (local missions), else None. ``takeoff_agl_m``, ``approach_agl_m`` None mean the lowest that the limits
-    allow. ``via`` holds east_m, north_m, and agl_m or None for any height.
+    allow. ``via`` holds east_m, north_m, and agl_m or None for any height. ``depart_window_s``: it may depart this much
+    later than planned.
     """
 
     vehicle: Vehicle
@@ -73,6 +74,7 @@ class VehicleRequest:
     climb_out: Literal["straight", "circles"] = "straight"
     start_amsl_m: float | None = None
     goal_amsl_m: float | None = None
+    depart_window_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,16 +154,16 @@ class MissionFile:
     wind: DeclaredWind = STILL_AIR
     departure: datetime | None = None
 
-    @property
-    def flight_wind(self) -> FlightWind | None:
-        """The declared winds as each vehicle flies in them; None in still air.
+    def flight_wind(self, request: VehicleRequest) -> FlightWind | None:
+        """The declared winds as a vehicle flies in them; None in still air with a departure on time.
 
-        One vehicle leaves at T+0; the vehicles of a fleet when their time table says.
+        One vehicle leaves at T+0, or so late as it may; the vehicles of a fleet when their time table says.
         """
-        if self.wind.still:
+        late_s = request.depart_window_s
+        if self.wind.still and not late_s:
             return None
         begins_s = 0.0 if self.departure is None else self.departure.timestamp()
-        return FlightWind(self.wind, (begins_s, begins_s if len(self.vehicles) == 1 else math.inf))
+        return FlightWind(self.wind, (begins_s, begins_s + late_s if len(self.vehicles) == 1 else math.inf), late_s)
 
     @property
     def changes(self) -> tuple[Note, ...]:

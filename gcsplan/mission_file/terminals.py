@@ -82,6 +82,7 @@ def make_request(
         return_route=keys.return_route,
         takeoff_heading_deg=keys.takeoff_heading_deg,
         climb_out=keys.climb_out,
+        depart_window_s=keys.depart_window_s,
         start_amsl_m=start.amsl_m,
         goal_amsl_m=goal.amsl_m,
     )

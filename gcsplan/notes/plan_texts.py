@@ -101,6 +101,10 @@ PLAN_TEXTS = {
         "{pairs} {pairs:pair|pairs} of start places {pairs:is|are} nearer than {needed_m:distance} (nearest: {first}, "
         "{second}: {apart_m:distance.1}): vehicles that wait on the ground are not judged against each other"
     ),
+    "departs_late": (
+        "it may depart up to {late_s:.0f} s late: its windows of arrival count that; the order, the intervals and the "
+        "separation of a fleet count its departure on time"
+    ),
     "judged_in_wind": (
         "the aircraft can fly the mission in all declared winds; windows of times stand beside the times in still air, "
         "energies are those of the worst wind, and a multicopter's corners are judged as in still air"

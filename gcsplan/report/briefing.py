@@ -212,7 +212,7 @@ def _facts(page: Page, s: Subject, units: Units) -> Iterator[tuple[str, str]]:
     yield "leaves", duration(s.depart_s)
     yield "at its goal", duration(s.arrive_s)
     if s.window_s is not None:
-        yield "at its goal in the wind", span(s.window_s)
+        yield "at its goal within", span(s.window_s)
     if s.motion is not None:
         end = duration(s.motion.end_s)
         yield "on the ground", "stays in the air" if s.motion.ends_in_air else "flies on" if s.leaves else end

@@ -198,7 +198,7 @@ def _card(subject: Subject, index: int, page: Page) -> str:
     if not in_fleet and subject.depart_s > 0.0:
         since = f"after the start, {duration(subject.depart_s)} of it on the ground"
     if subject.window_s is not None:
-        since += f"; {span(subject.window_s, page.time_decimals)} in the declared winds"
+        since += f"; within {span(subject.window_s, page.time_decimals)}"
     items = len(verdict.mission.wire_items())
     figures.append(
         (

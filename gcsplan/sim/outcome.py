@@ -40,7 +40,7 @@ class RehearsalPart:
     ``depart_s``, ``arrive_s``: seconds since the fleet's common start; ``arrive_s`` is None if none is planned.
     ``window_s``: the earliest and the latest arrival over the declared winds; None: planned in still air alone.
     ``airborne``: it begins at the top of its take-off (missions from papers); ``leaves``: it is gone when it arrives.
-    ``late_s``: how much later than planned it departs.
+    ``late_s``: how much later than planned it departs; ``depart_window_s``: and so much later again, drawn in each run.
     """
 
     vehicle: Vehicle
@@ -53,6 +53,7 @@ class RehearsalPart:
     leaves: bool = False
     window_s: tuple[float, float] | None = None
     late_s: float = 0.0
+    depart_window_s: float = 0.0
 
     @property
     def leaves_s(self) -> float:

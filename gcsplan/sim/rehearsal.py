@@ -11,6 +11,8 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from gcsplan.errors import GcsplanError, InputError
 from gcsplan.mavlink.link.link import Link
 from gcsplan.mavlink.link.session.session import SessionOptions, UploadOrder, upload_fleet
@@ -119,7 +121,7 @@ def prepared(
 
 def different(flights: Flights, runs: int) -> int:
     """How many of ``runs`` are flown: one if nothing makes them differ."""
-    return 1 if flights.weather.calm else runs
+    return 1 if flights.weather.calm and not any(p.depart_window_s for p in flights.parts) else runs
 
 
 def flown(flights: Flights, world: World, block: RunBlock) -> Tally:
@@ -127,7 +129,9 @@ def flown(flights: Flights, world: World, block: RunBlock) -> Tally:
     first, count = block
     parts = flights.parts
     tally = Tally(parts, flights.terms)
-    departs = [part.leaves_s for part in parts]
+    windows_s = np.array([part.depart_window_s for part in parts])
+    drawn = np.array([np.random.default_rng((flights.seed, first + r, 2)).random(len(parts)) for r in range(count)])
+    departs = (np.array([part.leaves_s for part in parts]) + drawn * windows_s).ravel()
     flight = fly(flights.tracks, departs, weather=flights.weather, runs=count, seed=flights.seed, first_run=first)
     for r in range(count):
         lanes = range(r * len(parts), (r + 1) * len(parts))

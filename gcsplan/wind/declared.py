@@ -156,7 +156,11 @@ def _between(nodes: Floats, x: Floats) -> tuple[np.ndarray, np.ndarray, Floats]:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class FlightWind:
-    """The wind of one flight, which leaves at a time between two: seconds UTC since 1970."""
+    """The wind of one flight, which leaves at a time between two: seconds UTC since 1970.
+
+    ``late_s``: how much later than planned it may leave.
+    """
 
     declared: DeclaredWind
     departs_s: tuple[float, float] = (0.0, 0.0)
+    late_s: float = 0.0

@@ -122,6 +122,16 @@ def test_a_late_vehicle_is_judged_by_its_own_departure_and_the_fleet_by_its_plan
     assert "late" not in {breach.kind for breach in lost.breaches}
 
 
+@pytest.mark.slow
+def test_a_departure_within_its_window_is_drawn_in_each_run_and_arrives_inside() -> None:
+    late = WINDY | {"vehicles": [WINDY["vehicles"][0] | {"depart_window_s": 30}]}  # type: ignore[index]
+    planned = plan(load_mission({key: value for key, value in late.items() if key != "wind"}))
+    result = rehearse(planned, runs=4)
+    assert result.inside_windows == (4, 4)
+    errors_s = result.vehicles[0].errors_s
+    assert 0.0 < min(errors_s) < max(errors_s) < 30.5
+
+
 def test_late_departures_are_read_by_name() -> None:
     assert late_of(["uav2=40", "uav1=0.5"], ["uav1", "uav2"]) == {"uav1": 0.5, "uav2": 40.0}
     for words in (["uav3=1"], ["uav1=-1"], ["uav1=nan"], ["40"], ["uav1=1", "uav1=2"]):

@@ -156,7 +156,7 @@ class MissionSite:
         error_m = source.terrain_error_m if source.altitude_frame == "terrain" else TERRAIN_ERROR_M
         if self._world is None:
             self._world = world_of(source)
-        return judged(request, file, read, self._world, error_m, parts, source.hours, source.flight_wind)
+        return judged(request, file, read, self._world, error_m, parts, source.hours, source.flight_wind(request))
 
     @property
     def sources(self) -> tuple[Mapping[str, object], tuple[Note, ...]]:

@@ -69,7 +69,7 @@ def _difference(plan: Plan, v: VehiclePlan, earlier: EarlierMission) -> PlanDiff
     request, source = v.request, plan.source
     before = judge(
         earlier.mission, request.vehicle, plan.world, rtl_rel_home_m=request.rtl_rel_home_m,
-        terrain_error_m=source.terrain_error_m, wind=source.flight_wind,
+        terrain_error_m=source.terrain_error_m, wind=source.flight_wind(request),
     )  # fmt: skip
     slot = None if plan.fleet is None else plan.fleet.slot(v.name)
     if earlier.notes is None:

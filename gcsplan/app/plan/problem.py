@@ -91,7 +91,7 @@ def built(brief: Brief, request: VehicleRequest, solution: Solution, order: Orde
     _require_room(mission, vehicle)
     return mission, judge(
         mission, vehicle, brief.world, rtl_rel_home_m=request.rtl_rel_home_m, terrain_error_m=source.terrain_error_m,
-        wind=source.flight_wind,
+        wind=source.flight_wind(request),
     )  # fmt: skip
 
 

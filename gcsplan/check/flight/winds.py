@@ -137,11 +137,15 @@ class FlightInWind:
 
     @cached_property
     def window(self) -> TimeWindow | None:
-        """The window of the end of each stretch, its hold and its rounds included, and with the share of gusts.
+        """The window of the end of each stretch, its hold and its rounds included, with the share of gusts, and after a
+        departure as late as it may be.
 
         None if the flight cannot be flown in one of the winds.
         """
-        return None if self.too_windy is not None else self._timed[0]
+        if self.too_windy is not None:
+            return None
+        found = self._timed[0]
+        return TimeWindow(found.earliest_s, found.latest_s + self.flies_in.late_s)
 
     @cached_property
     def _timed(self) -> tuple[TimeWindow, Floats]:

@@ -75,8 +75,8 @@ for screen in (console, aside):
 
 
 WIDEST = 100_000
-IN_WIND, PATH_TIME = "in the wind", "path at full speed"
-"""The column of the arrivals in the declared winds."""
+WITHIN, PATH_TIME = "within", "path at full speed"
+"""Columns of the earliest and the latest arrivals, and of the time that an objective of time lessens."""
 MOST_WITH_ALL_COLUMNS = 30
 """Most vehicles whose table has all columns, and whose transfers have a bar each."""
 MOST_NOTES, MOST_NAMES = 120, 110
@@ -146,7 +146,7 @@ def verdict_cell(safe: bool | None, home: WayHome | None, units: Units, *, lines
 def plan_table(plan: Plan, homes: Mapping[str, WayHome], units: Units = METRIC) -> None:
     """Print a plan: a column for each vehicle, values beside their limits; a row for each in a large fleet."""
     rows = [plan_row(v, plan.fleet, homes.get(v.name), units, lines=len(plan.vehicles) > 1) for v in plan.vehicles]
-    for rare in (IN_WIND, PATH_TIME, "energy, mAh", f"over or under a zone, {units.distance.symbol}"):  # mostly none
+    for rare in (WITHIN, PATH_TIME, "energy, mAh", f"over or under a zone, {units.distance.symbol}"):  # mostly none
         if all(row[rare] == "–" for row in rows):
             rows = [{name: words for name, words in row.items() if name != rare} for row in rows]
     if len(rows) > MOST_WITH_ALL_COLUMNS:
@@ -170,7 +170,7 @@ def _brief(units: Units) -> tuple[str, ...]:
     """The columns that the table of a larger fleet has."""
     return (
         "vehicle", f"length, {units.path.symbol}", "battery, %", f"lowest AGL, {units.height.symbol}",
-        f"speed, {units.speed.symbol}", "departs", "arrives", IN_WIND, "verdict",
+        f"speed, {units.speed.symbol}", "departs", "arrives", WITHIN, "verdict",
     )  # fmt: skip
 
 
@@ -268,7 +268,7 @@ def plan_row(
         f"speed, {units.speed.symbol}": number(v.speed_m_s, 2, units.speed),
         "departs": duration(slot.depart_s if slot else 0.0, tenths) + held,
         "arrives": duration(slot.arrive_s if slot else verdict.arrive_s, tenths),
-        IN_WIND: span(verdict.arrive_window_s(slot), tenths),
+        WITHIN: span(verdict.arrive_window_s(slot), tenths),
         "verdict": verdict_cell(verdict.safe, home, units, lines=lines),
     }
 
@@ -300,7 +300,7 @@ def release_table(plan: Plan, results: Sequence[JobResult], gate: GateTime | Non
         return
     ready = {d.vehicle for d in results if d.verified and not d.code}
     windows = {v.name: v.verdict.arrive_window_s(plan.fleet.slot(v.name)) for v in plan.vehicles}
-    windy = [(IN_WIND, True)] if any(windows.values()) else []
+    windy = [(WITHIN, True)] if any(windows.values()) else []
     columns = [("vehicle", False), ("release, T+", True), ("at the goal, T+", True), *windy, ("", False)]
     table = new_table("[bold]release[/]  by hand: nothing is armed or started from here", columns)
     for slot in sorted(plan.fleet.slots, key=lambda s: s.depart_s):

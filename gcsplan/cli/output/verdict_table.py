@@ -13,7 +13,7 @@ from rich.markup import escape
 from gcsplan.app.plan.way_home import warnings
 from gcsplan.check.verdict import by_item
 from gcsplan.cli.output.console import (
-    IN_WIND,
+    WITHIN,
     aside,
     console,
     greatest,
@@ -95,7 +95,7 @@ def verdict_table(
         else:
             say(", ".join([flight, *used]))
         if (window_s := verdict.arrive_window_s()) is not None:
-            say(f"arrives {duration(verdict.arrive_s)} in still air, {IN_WIND} {span(window_s)}")
+            say(f"arrives {duration(verdict.arrive_s)} in still air, {WITHIN} {span(window_s)}")
         say_extremes(verdict, units)
     say_notes(verdict.notes, wording)
 

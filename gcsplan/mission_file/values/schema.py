@@ -296,6 +296,8 @@ class VehicleKeys(LimitKeys):
     """Launch heading of a fixed wing; if absent, the planner chooses one."""
     climb_out: Literal["straight", "circles"] = "straight"
     """How a fixed wing climbs after its launch: straight ahead, while that is clear, or in circles near its start."""
+    depart_window_s: DaySeconds = 0.0
+    """It may depart this much later than planned; its windows of arrival count that."""
     speed_m_s: SpeedRange = [3.0, 15.0]
     """Slowest and fastest cruise speed; one number is both. A fixed wing's is the airspeed that it indicates."""
     lean_angle_deg: Annotated[float, Field(ge=10.0, le=80.0)] | None = None

@@ -82,12 +82,12 @@ class Subject:
 
     @property
     def window_s(self) -> tuple[float, float] | None:
-        """The earliest and latest arrival in the declared winds, counted as `arrive_s`; None in still air."""
+        """The earliest and latest arrival, counted as `arrive_s`; None in still air with a departure on time."""
         return self.verdict.arrive_window_s(self.slot)
 
     def window_words(self, decimals: int) -> str:
         """The window behind the arrival, in brackets; empty in still air."""
-        return "" if self.window_s is None else f" ({span(self.window_s, decimals)} in the wind)"
+        return "" if self.window_s is None else f" (within {span(self.window_s, decimals)})"
 
     @property
     def homeless(self) -> bool:

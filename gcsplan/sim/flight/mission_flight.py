@@ -169,17 +169,17 @@ def _next_stop(track: CommandedTrack) -> Indices:
 
 
 def fly(
-    tracks: Sequence[CommandedTrack], depart_s: Sequence[float], *, weather: Weather | None = None, runs: int = 1,
-    seed: int = 1, first_run: int = 0,
+    tracks: Sequence[CommandedTrack], depart_s: Sequence[float] | Floats, *, weather: Weather | None = None,
+    runs: int = 1, seed: int = 1, first_run: int = 0,
 ) -> FlownLanes:  # fmt: skip
-    """Fly every track, each released at its ``depart_s``, in ``runs`` runs of different weather.
+    """Fly every track, each released at its ``depart_s`` (or one for each lane), in ``runs`` runs of different weather.
 
     In still air all runs are the same. The weather of run ``first_run`` + r does not depend on the other runs.
     """
     weather = weather or Weather()
     ways = _Ways(tracks)
     air = Air(weather, tracks, runs, seed, first_run)
-    lanes = _Lanes(tracks, ways, np.tile(np.asarray(depart_s, dtype=np.float64), runs), runs)
+    lanes = _Lanes(tracks, ways, np.resize(np.asarray(depart_s, dtype=np.float64), runs * len(tracks)), runs)
     latest_s = max(depart_s) + PATIENCE * ways.calm_s() + PATIENCE_SPARE_S
     times, along, offset = [0.0], [lanes.s.copy()], [air.offset]
     step, through_m = 0, np.zeros(len(lanes.s))

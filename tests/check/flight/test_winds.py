@@ -105,6 +105,21 @@ def test_out_and_back_in_one_wind_counts_its_headwind_once(base_w: float) -> Non
     assert flown(blows((0, 7), (0, 360), varying=True), craft, back).energy_j > 1.2 * whole.energy_j
 
 
+@pytest.mark.parametrize("craft", [leaning(), wing()], ids=["copter", "wing"])
+def test_a_late_departure_widens_every_window_and_changes_no_figure(craft: Vehicle) -> None:
+    way = through([(800.0, 0.0, 80.0), (3000.0, 900.0, 80.0)])
+    mission = way if craft.keeps_airspeed else mission_over(world(), THERE, craft)[0]
+    still, late = (judge(mission, craft, world(), wind=w) for w in (None, replace(blows((0, 0), (0, 0)), late_s=40.0)))
+    earliest_s, latest_s = window_of(late)
+    assert earliest_s == pytest.approx(still.arrive_s, abs=1e-6)
+    assert latest_s == pytest.approx(still.arrive_s + 40.0, abs=1e-6)
+    assert late.legs == still.legs
+    on_time = blows((4, 4), (90, 90))
+    before, after = (ends_of(judge(mission, craft, world(), wind=w)) for w in (on_time, replace(on_time, late_s=40.0)))
+    assert after.latest_s - before.latest_s == pytest.approx(40.0, abs=1e-6)
+    assert (after.earliest_s == before.earliest_s).all()
+
+
 def test_a_wind_too_strong_is_refused_with_one_that_was_tried() -> None:
     verdict = flown(blows((0, 20), (0, 360)))
     [finding] = verdict.findings
