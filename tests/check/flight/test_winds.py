@@ -77,6 +77,11 @@ def test_a_constant_wind_gives_one_time_and_only_what_the_lean_allows() -> None:
     earliest_s, latest_s = window_of(blown)
     assert latest_s == earliest_s > still.arrive_s + 60.0
     assert blown.arrive_s == still.arrive_s
+    assert blown.drift is not None  # the window is one time, but another one than in still air
+    assert blown.drift.moves
+    unmoved = flown(blows((0.5, 0.5), (90, 90))).drift
+    assert unmoved is not None
+    assert not unmoved.moves
     assert window_of(flown(blows((6, 6), (270, 270))))[1] == pytest.approx(still.arrive_s, abs=1e-6)
 
 
