@@ -75,7 +75,8 @@ def check(
     `.plan` file: the result is one verdict. The last two need ``within``: a plan or a mission (or anything that
     `load_mission` accepts) with the terrain, zones and limits. ``vehicle`` names the vehicle of ``within`` that flies,
     if neither the file's stem nor the mission's name does. ``wind`` has the keys of a mission's `wind` (such as
-    ``{"up_to_m_s": 8}``), which count in place of the world's own.
+    ``{"up_to_m_s": 8}``; the path of a forecast is relative to the current folder), which count in place of the
+    world's own.
 
     In a `Verdict`, ``safe`` is True, False or None (something could not be judged: ``not_judged``). ``findings`` state
     which limit is broken on which item. ``legs`` hold heights in m, angles in degrees, times in s and energies in J.

@@ -23,10 +23,12 @@ WRITE = "write at: [from, to] with all of the flight in it"
 
 
 def landing_of(verdict: Verdict, departure: datetime) -> datetime | None:
-    """When a flight that leaves the ground at ``departure`` is over, all holds included; None if it has no end."""
+    """When a flight that leaves the ground at ``departure``, or so late as it may, is over in the slowest declared
+    wind, all holds included; None if it has no end."""
     if not verdict.legs or verdict.legs[-1].kind not in LANDINGS:
         return None
-    lasts_s = verdict.time_s
+    window = None if verdict.in_wind is None else verdict.in_wind.window
+    lasts_s = verdict.time_s if window is None else max(verdict.time_s, float(window.latest_s[-1]))
     if not math.isfinite(lasts_s) or any(math.isinf(leg.hold_s) for leg in verdict.legs):
         return None
     return departure + timedelta(seconds=math.ceil(min(lasts_s, FAR_S)))

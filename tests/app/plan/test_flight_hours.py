@@ -42,6 +42,15 @@ def test_a_flight_is_over_a_whole_second_after_its_time() -> None:
     assert landed == TEN + timedelta(seconds=math.ceil(verdict().time_s))
 
 
+def test_a_flight_in_wind_lasts_until_its_latest_landing() -> None:
+    blown = check(planned(), wind={"speed_m_s": 8, "from_deg": 90})["uav1"]
+    assert blown.in_wind is not None
+    assert blown.in_wind.window is not None
+    landed = landing_of(blown, TEN)
+    assert landed == TEN + timedelta(seconds=math.ceil(blown.in_wind.window.latest_s[-1]))
+    assert landed > TEN + timedelta(seconds=blown.time_s + 30.0)
+
+
 def test_a_flight_that_ends_in_the_air_or_waits_for_ever_has_no_landing() -> None:
     made = verdict()
     *legs, last = made.legs
