@@ -11,14 +11,14 @@ from gcsplan.report.parts.page_data import in_full, samples_of
 from gcsplan.report.views.space import drawn, space_data
 from gcsplan.units import Units
 
-MOST_SAMPLES = 300
+SCENE_SAMPLES = 300
 """Most samples of one line; a few more if it has many legs."""
 
 
 def scene_answer(n: int, plan: Plan, units: Units) -> dict[str, Any]:
     """The ground, the zones, the lines and the replay of a plan; vehicles have their numbers in the mission file."""
     page, numbers = page_of_plan(plan, units=units), numbers_of(plan)
-    seen = drawn(page, [min(samples, MOST_SAMPLES) for samples in samples_of(page, in_full(page))])
+    seen = drawn(page, [min(samples, SCENE_SAMPLES) for samples in samples_of(page, in_full(page))])
     data: dict[str, Any] = space_data(page, seen)
     for line in data["lines"]:
         line["index"] = numbers[line["name"]]

@@ -44,6 +44,14 @@ function span(rows) {
   return [Math.max(0, from - room), to + room];
 }
 
+// A time that is to be seen is in the part that is shown.
+function seen(t) {
+  const [from, to] = span(fleet().rows);
+  if (t >= from && t <= to) return;
+  whole = true;
+  paint();
+}
+
 function paint() {
   const found = fleet();
   byId('time').hidden = !found && byId('replay-box').hidden;
@@ -58,7 +66,7 @@ function head(found) {
   const apart = found.separation, closest = apart && apart.closest;
   return el('div', { class: 'head' },
     el('p', { class: apart && !apart.safe ? 'bad' : null, role: 'status' }, `${apart ? apart.text : ''}${found.required || !apart || apart.safe ? '' : ' No rule keeps them apart: choose one under Arrival.'}`),
-    closest ? button('Closest approach', () => { goTo(closest.at); markPlace(closest.at, least(closest.distance_m, 1, known.state.units.kinds.distance), apart.safe ? 'tight' : 'broken'); showAt(closest.time_s); }, { id: 'time-closest', title: 'Show the moment and the place' }) : null,
+    closest ? button('Closest approach', () => { seen(closest.time_s); goTo(closest.at); markPlace(closest.at, least(closest.distance_m, 1, known.state.units.kinds.distance), apart.safe ? 'tight' : 'broken'); showAt(closest.time_s); }, { id: 'time-closest', title: 'Show the moment and the place' }) : null,
     button(whole ? 'Arrivals' : 'Whole flights', () => { whole = !whole; paint(); }, { id: 'time-zoom' }));
 }
 
@@ -97,7 +105,8 @@ function wordsOf(r, i, rows) {
 }
 
 function axis(from, to, part) {
-  const step = [1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 14400].find((s) => s >= (to - from) / 7) || 28800, ticks = [];
+  const most = Math.max(2, Math.min(8, Math.floor((box.clientWidth - 150) / 90)));
+  const step = [1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 14400].find((s) => s >= (to - from) / most) || 28800, ticks = [];
   for (let t = Math.ceil(from / step) * step; t <= to; t += step) {
     if (part(t) < 4 || part(t) > 96) continue; // its words would be cut
     const tick = el('span', {}, duration(t));

@@ -20,7 +20,7 @@ from gcsplan.world.world import World
 
 
 @dataclass(frozen=True, eq=False)
-class Drawn:
+class Drawing:
     """What a page draws: the line of each subject (None: there is nothing to follow), the ground below, the replay."""
 
     lines: tuple[TrackLine | None, ...]
@@ -28,7 +28,7 @@ class Drawn:
     replay: Replay | None
 
 
-def drawn(page: Page, samples: Sequence[int]) -> Drawn:
+def drawn(page: Page, samples: Sequence[int]) -> Drawing:
     """The lines of a page's subjects, each with about as many ``samples`` as given for it, and the ground around."""
     lines = tuple(
         line_of(s.verdict, page.world, s.vehicle.limits, samples=many, slot=s.slot)
@@ -36,10 +36,10 @@ def drawn(page: Page, samples: Sequence[int]) -> Drawn:
     )
     airspace = page.world.airspace
     extent = extent_of([line for line in lines if line is not None], no_fly_of(airspace.zones), airspace.surface)
-    return Drawn(lines, relief_of(page.world, extent, page.units.height), replay_of(page))
+    return Drawing(lines, relief_of(page.world, extent, page.units.height), replay_of(page))
 
 
-def space_data(page: Page, seen: Drawn) -> dict[str, object]:
+def space_data(page: Page, seen: Drawing) -> dict[str, object]:
     """The ground, the lines, the zones and the replay for the page's script."""
     there, relief, airspace = [line for line in seen.lines if line is not None], seen.relief, page.world.airspace
     return {
