@@ -176,8 +176,8 @@ class Planner:
         ``on_path(better)`` is called for each path that is better than those before, ``on_bound(vehicle, bound)`` for
         each higher lower bound, both in this thread while the search goes on; what they raise ends the plan.
 
-        ``alone`` names a vehicle that is planned without the others: its path, and no time table. This is quick while
-        only that vehicle changes, and no plan of the mission.
+        ``alone`` names a vehicle: the mission is planned as if the others were not in it. This is quick while only that
+        vehicle changes, and says nothing of the others.
 
         Returns what `gcsplan.plan` returns. Raises InputError, NoMission, and Cancelled after `cancel`.
         """
@@ -198,9 +198,7 @@ class Planner:
         content = self._content if changes is None else _changed(self._content, changes)
         with cancelled_by(lambda: self._cancels != cancels), self._planning:
             heed_cancel()
-            source = load_content(content, self._kept)
-            if alone is not None:
-                source = _alone(source, alone)
+            source = load_content(content if alone is None else _alone(content, alone), self._kept)
             heard = _Listening(source, on_path, on_bound, begun_s) if on_path or on_bound else None
             lasting = changes is None and alone is None  # what counts for this plan alone leaves no trace
             kept = self._paths if lasting else KeptPaths()
@@ -272,13 +270,18 @@ def path_of(v: VehiclePlan, world: World, elapsed_s: float) -> BetterPath:
     return BetterPath(v.name, lat, lon, points[:, 2].copy(), v.cost, v.solution.lower_bound, elapsed_s)
 
 
-def _alone(source: MissionFile, name: str) -> MissionFile:
-    """The mission of one of its vehicles. Raises InputError."""
-    found = tuple(request for request in source.vehicles if request.vehicle.name == name)
-    if not found:
-        names = [request.vehicle.name for request in source.vehicles]
-        raise unknown_name(f"alone names a vehicle of the mission, given {name[:64]!r}", name, names)
-    return replace(source, vehicles=found, arrival=None)
+def _alone(content: Content, name: str) -> Content:
+    """The mission with one of its vehicles, and nothing that is about others. Raises InputError."""
+    vehicles = content.given.get("vehicles")
+    known = _named(vehicles) if isinstance(vehicles, list) else {}
+    if name not in known:
+        raise unknown_name(f"alone names a vehicle of the mission, given {name[:64]!r}", name, known)
+    given = {key: value for key, value in content.given.items() if key != "arrival"}
+    given["vehicles"] = [vehicles[known[name]]]  # type: ignore[index]
+    planner = given.get("planner")
+    if isinstance(planner, dict) and planner.get("warm_start") in known.keys() - {name}:
+        given["planner"] = {key: value for key, value in planner.items() if key != "warm_start"}
+    return replace(content, given=given)
 
 
 def _changed(content: Content, changes: Mapping[str, object]) -> Content:

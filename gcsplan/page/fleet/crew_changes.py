@@ -104,7 +104,7 @@ def _together(document: CrewDocument, changes: dict[str, object]) -> dict[str, o
         key = place.removeprefix("arrival.")
         if key == place or value is None:
             continue
-        unused = [*other_names([key]), *_REFUSED_WITH.get(key, ()), *_REFUSED_WITH.get(str(value), ())]
+        unused = [*other_names([key]), *_REFUSED_WITH.get(str(value) if key == "mode" else key, ())]
         names = {name for one in unused for name in (one, *other_names([one]))} if key in ARRIVAL else ()
         gone |= {f"arrival.{name}": None for name in names if name in arrival}
     return {**gone, **changes}

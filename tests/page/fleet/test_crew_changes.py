@@ -47,6 +47,7 @@ def test_keys_of_the_arrival_that_do_not_go_together_give_way() -> None:
     assert with_crew(PAIR, {"arrival.interval_s": 20}) == {"arrival.interval_min": None, "arrival.interval_s": 20}
     assert with_crew(PAIR, {"arrival.mode": "together"}) == {"arrival.clock": None, "arrival.mode": "together"}
     assert with_crew(PAIR, {"arrival.arrive_s": 90}) == {"arrival.clock": None, "arrival.arrive_s": 90}
+    assert with_crew(PAIR, {"arrival.hold": "none"}) == {"arrival.hold": "none"}
     assert arrival_of(PAIR) == {"mode": "sequence", "order": ["uav3", "uav1"], "interval_s": 30, "clock": "fleet"}
 
 
