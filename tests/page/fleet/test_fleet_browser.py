@@ -141,6 +141,8 @@ def test_a_fleet_is_replayed_and_seen_in_space_while_it_is_edited(page: Browser,
         assert page.evaluate("[...document.querySelectorAll('#time .now')].every((e) => !e.hidden)")
         assert page.evaluate("document.querySelector('#place .mark.tight').innerText").endswith("m")
         assert page.evaluate("document.querySelector('#below path.craft').getAttribute('d')").startswith("M")
+        hand.click("#zoom-all")
+        hand.until("new Promise((done) => setTimeout(() => done(true), 300))")
         x, y = hand.at("#grip-1-goal")
         hand.press(x, y)
         for step in (10, 20, 30):
@@ -164,8 +166,9 @@ def test_a_fleet_is_edited_by_the_keyboard_alone(page: Browser, tmp_path: Path) 
         page.evaluate("document.getElementById('vehicle-add').focus()")
         hand.key("Enter")
         hand.until("document.activeElement.tagName === 'CANVAS'")
-        hand.key("ArrowLeft")
-        hand.until("new Promise((done) => setTimeout(() => done(true), 700))")
+        for _ in range(2):
+            hand.key("ArrowRight")
+            hand.until("new Promise((done) => setTimeout(() => done(true), 700))")
         hand.key("Enter")
         hand.until("document.getElementById('crew-begun')")
         hand.key("ArrowUp")
@@ -219,8 +222,9 @@ def test_time_line_and_space_fit_a_phone_and_a_dark_room(page: Browser, tmp_path
         hand = Hand(page)
         hand.judged()
         add(hand, 1)
-        hand.click("#show-space")
-        hand.click("#show-replay")
+        for button in ("#show-space", "#show-replay"):
+            page.evaluate("window.scrollTo(0, 0)")  # a phone's header lies over what is scrolled below it
+            hand.click(button)
         hand.until("document.querySelector('#replay output')")
         assert page.evaluate("document.documentElement.scrollWidth") <= width
         buttons = "[...document.querySelectorAll('button:not(.spot), select')].filter((e) => e.offsetParent)"
