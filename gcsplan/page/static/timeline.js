@@ -17,6 +17,8 @@ export function startTimeline() {
   on('plan', draw);
   on('state', (state) => { if (state.stage !== 'mission' || !many()) draw(null); else if (box.children.length) paint(); });
   for (const kind of ['path', 'refused', 'asked']) on(kind, () => box.classList.add('old'));
+  on('unsent', draw);
+  on('error', (message) => { if (message.code === 'bad_change') draw(); }); // the arrival goes back
   on('replayed', (shown) => { now = shown && shown.t; cursor(); });
 }
 
