@@ -12,6 +12,15 @@ LINK_TEXTS = {
     ),
     "vehicle_type_not_told": "the vehicle does not say whether it is what {autopilot} flies",
     "vehicle_state_not_told": "the vehicle does not report its state: whether it is ready could not be checked",
+    "wind_as_declared": (
+        "the vehicle estimates a wind of {speed_m_s:speed.1} from {from_deg:.0f}°, which is within the plan's ({declared})"
+    ),
+    "wind_not_as_declared": (
+        "the vehicle estimates a wind of {speed_m_s:speed.1} from {from_deg:.0f}°, {away_m_s:speed.1} from the nearest "
+        "one that the plan counts ({declared}): times, energy and ways home do not hold in it; declare it and plan "
+        "again, or wait"
+    ),
+    "wind_not_estimated": "the vehicle gives no estimate of the wind to hold beside the declared one",
     "vehicle_in_trouble": "the vehicle reports that it is {state}",
     "armed_as_allowed": "the vehicle is armed, which was allowed",
     "only_mavlink1": (

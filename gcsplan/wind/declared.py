@@ -115,6 +115,16 @@ class DeclaredWind:
         angle = turn + shares[:, 1, None, None] * (np.radians(self.from_deg[..., 1]) - turn)
         return np.stack([-speed * np.sin(angle), -speed * np.cos(angle)], axis=-1)  # towards where it blows
 
+    def away_m_s(self, vector_m_s: tuple[float, float], amsl_m: float, agl_m: float, at_s: float) -> float:
+        """How far a wind's vector (to east, to north) is from the nearest wind of the set at a height and an hour, m/s.
+
+        Gusts do not count. Directions are looked at degree by degree: at 20 m/s this is 0.2 m/s too far at most.
+        """
+        speeds, turns = np.meshgrid(np.linspace(0.0, 1.0, 33), np.linspace(0.0, 1.0, 361))
+        shares = np.column_stack([speeds.ravel(), turns.ravel()])
+        winds = self.vectors_m_s(shares, np.array([amsl_m]), np.array([agl_m]), np.array([at_s]))[:, 0]
+        return float(np.hypot(*(winds - np.asarray(vector_m_s)).T).min())
+
     def bow_m_s(self, cells: Floats, amsl_m: Floats, agl_m: Floats, at_s: Floats) -> Floats:
         """(K, N) how far winds of cells of shares lie at most beyond the quadrangle of the winds at their corners, m/s.
 

@@ -278,6 +278,7 @@ def order_of(
     listen_s: float,
 ) -> session.UploadOrder:
     """``job`` as an order of the session over ``link``. ``listen_s``: how long to listen for rivals, s."""
+    from gcsplan.app.upload.wind_on_board import WIND_S, flight_wind_of, wind_judge
     from gcsplan.mavlink.link.session import session
 
     ground_m = None
@@ -299,6 +300,8 @@ def order_of(
         listen_s=listen_s,
         vehicle=job.vehicle,
         settings=() if simulated else settings_of(job),
+        wind=None if simulated else wind_judge(job),
+        wind_s=0.0 if flight_wind_of(job).declared.still else WIND_S,
     )
     again = None
     if job.verdict is not None:

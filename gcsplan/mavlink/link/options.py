@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from gcsplan.errors import InputError
+from gcsplan.mavlink.link.watch import VehicleState
 from gcsplan.mavlink.mission.mission import MISSION, Mission, MissionItem
 from gcsplan.mavlink.mission.parameter_list import Setting
 from gcsplan.mavlink.mission.return_parameters import ReturnRoute
@@ -71,6 +72,10 @@ ReadBackJudge = Callable[[Mission, Mapping[str, float]], Note | None]
 """Repeats the caller's check with the parameters that were read: None if it passes, else why it does not."""
 
 
+WindJudge = Callable[[VehicleState], Note | None]
+"""Holds the vehicle's estimate of the wind, or that there is none, beside the winds of the plan; None: nothing to say."""
+
+
 @dataclass(frozen=True, slots=True)
 class SessionOptions:
     """Options of a session. ``unchecked``: send without a verdict. ``simulated``: only copied to the result.
@@ -82,7 +87,8 @@ class SessionOptions:
     that was checked), ``route`` (of the return that was checked), ``advised_rel_home_m`` (the one to set, if another is
     better), ``settings`` (what the mission was judged with) and ``expected_parameters``, and a PX4's motion with
     ``vehicle``. ``terrain``: the ground for a mission in
-    the terrain frame, which is then served and compared (`link.terrain`).
+    the terrain frame, which is then served and compared (`link.terrain`). ``wind``: what the vehicle's estimate of the
+    wind is held beside; one that is late is waited for until ``wind_s`` after the first request.
     """
 
     unchecked: bool = False
@@ -104,6 +110,8 @@ class SessionOptions:
     simulated: bool = False
     vehicle: Vehicle | None = None
     settings: tuple[Setting, ...] = ()
+    wind: WindJudge | None = None
+    wind_s: float = 0.0
 
     def __post_init__(self) -> None:
         checked_timeout_s(self.timeout_s)

@@ -23,6 +23,8 @@ from gcsplan.mavlink.mission.mission import Home
 from gcsplan.mavlink.protocol.messages import Address
 
 _MOST_HEIGHT_M = 100_000.0
+_MOST_WIND_M_S = 100.0
+_UNSURE_M_S = 3.0  # standard deviation of an estimate of the wind that says nothing yet
 
 
 class VehiclePosition(NamedTuple):
@@ -31,6 +33,27 @@ class VehiclePosition(NamedTuple):
     lat_deg: float
     lon_deg: float
     amsl_m: float
+
+
+class WindEstimate(NamedTuple):
+    """The wind that a vehicle estimates, by the place to which it blows; ``deviation_m_s`` is 0 if it is not known.
+
+    ArduPilot sends WIND: a plane always, a copter once it knows its airspeed. PX4 sends WIND_COV once its filter runs.
+    """
+
+    east_m_s: float
+    north_m_s: float
+    deviation_m_s: float = 0.0
+
+    @property
+    def speed_m_s(self) -> float:
+        """Its speed."""
+        return math.hypot(self.east_m_s, self.north_m_s)
+
+    @property
+    def from_deg(self) -> float:
+        """The direction it comes from, clockwise from true north, 0 to 360."""
+        return math.degrees(math.atan2(-self.east_m_s, -self.north_m_s)) % 360.0
 
 
 def finite(value: object) -> float | None:
@@ -95,6 +118,7 @@ class VehicleState:
     ``beat_at`` and ``placed_at``: times of the last heartbeat and position (clock of the link; -inf: never).
     ``just_at``: another position reported within `FRESH_S`, too far away for the vehicle to have moved there.
     ``mavlink1``: its last message came in MAVLink 1. ``round_trip_s``: how long its first answer took; 0: not known.
+    ``wind``: its newest estimate of the wind.
     """
 
     address: Address
@@ -116,6 +140,7 @@ class VehicleState:
     flight_sw_version: int | None = None
     mavlink1: bool = False
     round_trip_s: float = 0.0
+    wind: WindEstimate | None = None
 
     @property
     def what(self) -> str:
@@ -190,6 +215,7 @@ class _Reports:
     version: int | None = None
     home: Home | None = None
     mavlink1: bool = False
+    wind: WindEstimate | None = None
     first: float = 0.0
     at: float = 0.0
 
@@ -291,7 +317,7 @@ class Watch:
             lat, lon, amsl, reports.capabilities, self._rivals(best[:2]), reports.home, tuple(self.texts),
             best[1], source.at, reports.placed_at,
             reports.leapt_from if now - reports.leapt_at <= FRESH_S else None, reports.version,
-            reports.mavlink1,
+            reports.mavlink1, wind=reports.wind,
         )  # fmt: skip
 
     def alike(self) -> bool:
@@ -407,10 +433,33 @@ def _home_position(reports: _Reports, m: Any, now: float) -> None:
         reports.home = Home(m.latitude, m.longitude, found.amsl_m)
 
 
+def _wind(reports: _Reports, m: Any, now: float) -> None:
+    """WIND of ArduPilot: the direction is the one that the wind comes from."""
+    speed_m_s, from_deg = finite(m.speed), finite(m.direction)
+    if speed_m_s is not None and from_deg is not None:
+        from_rad = math.radians(from_deg)
+        _estimate(reports, WindEstimate(-speed_m_s * math.sin(from_rad), -speed_m_s * math.cos(from_rad)))
+
+
+def _wind_cov(reports: _Reports, m: Any, now: float) -> None:
+    """WIND_COV of PX4: the velocity of the air to north and east, and the sum of both variances."""
+    north_m_s, east_m_s, variance = finite(m.wind_x), finite(m.wind_y), finite(m.var_horiz)
+    if north_m_s is not None and east_m_s is not None and (variance is None or variance >= 0.0):
+        _estimate(reports, WindEstimate(east_m_s, north_m_s, math.sqrt(variance or 0.0)))
+
+
+def _estimate(reports: _Reports, found: WindEstimate) -> None:
+    """Take an estimate. Exactly no wind is how a filter begins that has estimated none yet."""
+    if 0.0 < found.speed_m_s <= _MOST_WIND_M_S and found.deviation_m_s <= _UNSURE_M_S:
+        reports.wind = found
+
+
 _CLOCKS = frozenset({"SYSTEM_TIME", "ATTITUDE", "GLOBAL_POSITION_INT"})
 _TELLS = {
     "GLOBAL_POSITION_INT": _position,
     "GPS_RAW_INT": _fix,
     "AUTOPILOT_VERSION": _version,
     "HOME_POSITION": _home_position,
+    "WIND": _wind,
+    "WIND_COV": _wind_cov,
 }

@@ -56,6 +56,7 @@ class LoopbackVehicle:
         self.name = name or f"vehicle {sysid}"
         self.misbehave = misbehave or Misbehaviour()
         self.mode = 0  # custom mode, as last set by a ground station
+        self.wind: tuple[float, float] | None = None  # m/s and the direction it comes from; set before it is served
         self._boot_s = boot_s
         self._board = Board(Home.at(lat_deg, lon_deg, amsl_m), armed=self.misbehave.armed)
         faults = Faults(self.misbehave)

@@ -59,6 +59,9 @@ class Telemetry:
             mav.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: self._extended_sys_state,
             mav.MAVLINK_MSG_ID_AUTOPILOT_VERSION: self._autopilot_version,
         }
+        if vehicle.wind is not None:
+            kind = mav.MAVLINK_MSG_ID_WIND if vehicle.autopilot.is_ardupilot else mav.MAVLINK_MSG_ID_WIND_COV
+            self._by_id[kind] = self._wind
         if vehicle.autopilot.is_ardupilot:
             self._by_id[mav.MAVLINK_MSG_ID_TERRAIN_REPORT] = self._terrain_report
 
@@ -179,6 +182,14 @@ class Telemetry:
         if self._terrain is None or self._terrain.grid.spacing_m != spacing_m:
             self._terrain = TerrainMemory(spacing_m)
         return self._terrain
+
+    def _wind(self, now: float) -> Message:
+        speed_m_s, from_deg = self._vehicle.wind or (0.0, 0.0)
+        if self._vehicle.autopilot.is_ardupilot:
+            return mav.MAVLink_wind_message(from_deg, speed_m_s, 0.0)
+        from_rad, alt_m = math.radians(from_deg), self._vehicle.home.amsl_m
+        north_m_s, east_m_s = -speed_m_s * math.cos(from_rad), -speed_m_s * math.sin(from_rad)
+        return mav.MAVLink_wind_cov_message(int(now * 1e6), north_m_s, east_m_s, 0.0, 0.1, 0.0, alt_m, 0.0, 0.0)
 
     def _terrain_report(self, now: float) -> Message:
         home, terrain = self._vehicle.home, self.terrain

@@ -174,3 +174,30 @@ def test_patience_ends_without_progress_and_after_two_seconds_an_item() -> None:
     assert [slow.over((n,), 5, 4.0 * n) is None for n in range(6)] == [True] * 5 + [False]
     unknown = TransferPatience(10.0, None, 0.0)
     assert all(unknown.over((n,), 100, 4.0 * n) is None for n in range(50))
+
+
+def of_wind(speed_m_s: float, from_deg: float) -> Heard:
+    return Heard(Address(1, 1), "a", dialect.MAVLink_wind_message(from_deg, speed_m_s, 0.0))
+
+
+def of_cov(north_m_s: float, east_m_s: float, variance: float) -> Heard:
+    message = dialect.MAVLink_wind_cov_message(0, north_m_s, east_m_s, 0.0, variance, 0.0, 0.0, 0.0, 0.0)
+    return Heard(Address(1, 1), "a", message)
+
+
+def test_the_wind_is_the_one_that_either_autopilot_says() -> None:
+    both = [seen((0.1, of_wind(5.0, -90.0))).wind, seen((0.1, of_cov(0.0, 5.0, 0.25))).wind]
+    for wind in both:
+        assert wind is not None
+        assert (wind.speed_m_s, wind.from_deg) == (pytest.approx(5.0), pytest.approx(270.0))
+    assert [wind.deviation_m_s for wind in both if wind] == [0.0, 0.5]
+
+
+@pytest.mark.parametrize("value", ODD)
+def test_no_wind_is_made_of_odd_numbers_or_of_a_filter_that_has_none(value: float) -> None:
+    assert seen((0.1, of_wind(math.nan, value))).wind is None
+    assert seen((0.1, of_wind(value, math.nan))).wind is None
+    assert seen((0.1, of_cov(value if abs(value) > 100.0 else math.nan, 0.0, 0.0))).wind is None
+    assert seen((0.1, of_wind(0.0, 180.0))).wind is None
+    assert seen((0.1, of_cov(3.0, 3.0, 9.1))).wind is None  # 3 m/s of deviation
+    assert seen((0.1, of_wind(101.0, 0.0))).wind is None

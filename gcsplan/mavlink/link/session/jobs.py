@@ -8,11 +8,11 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
-from gcsplan.errors import LinkError, VehicleRefused
+from gcsplan.errors import GcsplanError, LinkError, VehicleRefused
 from gcsplan.mavlink.link.link import Channel, LinkSteps
 from gcsplan.mavlink.link.options import SessionOptions, Task, TransferPatience
 from gcsplan.mavlink.link.session.parameters import (
@@ -36,7 +36,14 @@ from gcsplan.mavlink.link.session.preflight import (
 from gcsplan.mavlink.link.session.recheck import Recheck
 from gcsplan.mavlink.link.session.recheck import StateJudge as JudgeState
 from gcsplan.mavlink.link.session.results import FailsCheck, UploadResult, outcome_word
-from gcsplan.mavlink.link.session.steps import SLOW_ANSWER_S, discover_steps, drive, parameter_steps
+from gcsplan.mavlink.link.session.steps import (
+    SLOW_ANSWER_S,
+    ask_wind,
+    discover_steps,
+    drive,
+    parameter_steps,
+    wind_steps,
+)
 from gcsplan.mavlink.link.terrain import TERRAIN_GROUPS, flies_terrain, terrain_steps
 from gcsplan.mavlink.link.watch import VehicleState, Watch
 from gcsplan.mavlink.mission.autopilots import ARDUPILOTMEGA, max_items
@@ -72,25 +79,80 @@ def finding(channel: Channel, watch: Watch, options: SessionOptions) -> LinkStep
     )  # fmt: skip
 
 
+@dataclass(slots=True)
+class Readied:
+    """A vehicle before a list is sent to it, as far as its checks have come: see `readying`.
+
+    ``against``: why nothing may be sent; ``mission``: what it holds. Both are for `looking` alone.
+    """
+
+    watch: Watch
+    state: VehicleState | None = None
+    recheck: Recheck | None = None
+    warnings: list[Note] = field(default_factory=list)
+    values: OnBoard = field(default_factory=OnBoard)
+    against: GcsplanError | None = None
+    mission: Mission | None = None
+
+
+def readying(channel: Channel, task: Task, found: Readied) -> LinkSteps[tuple[VehicleState, Recheck]]:
+    """Find the vehicle, run preflight, read parameters and wind, and judge; ``found`` has each as soon as it is known.
+
+    Raises VehicleRefused and LinkError where the list may not be sent.
+    """
+    clock, options, watch, warnings = channel.link.clock, task.options, found.watch, found.warnings
+    state = found.state = yield from finding(channel, watch, options)
+    recheck = found.recheck = _holding(channel, watch, state, options, lambda now: objections(
+        now, task.items, task.autopilot, **_terms(task)
+    ))  # fmt: skip
+    warnings += _of_link(channel)
+    warnings += preflight(state, task.items, task.autopilot, **_terms(task))
+    wind_until = clock() + options.wind_s + state.round_trip_s
+    if options.wind is not None:
+        ask_wind(channel, state)  # its answer is there before all parameters are
+    against, found.values = yield from reading_parameters(channel, task, state, watch, recheck)
+    warnings += against
+    if options.wind is not None:
+        found.state = yield from wind_steps(channel, state, recheck, wind_until if options.wind_s else clock())
+        beside = options.wind(found.state)
+        warnings += [] if beside is None else [beside]
+    noted, off = yield from terrain_steps(
+        channel, state.address, task.items, found.values, options.terrain, recheck.note
+    )
+    warnings += noted
+    found.values.update(off)
+    failed = None
+    if task.mission and options.read_parameters:
+        failed = yield from judging(channel, task, task.mission, found.values, recheck)
+    if failed is not None:
+        raise FailsCheck(failed, task.sysid)
+    return state, recheck
+
+
+def looking(channel: Channel, task: Task) -> LinkSteps[Readied]:
+    """Check a vehicle as `uploading` does before it sends, and read the mission on board; nothing is written.
+
+    Raises LinkError and VehicleRefused if the vehicle is not found or what it holds cannot be read.
+    """
+    found = Readied(Watch(task.sysid))
+    try:
+        yield from readying(channel, task, found)
+    except VehicleRefused as why:
+        found.against = why
+    if found.state is None or found.recheck is None:
+        raise found.against or LinkError("the vehicle was not found", where=f"vehicle {task.sysid}")
+    read = yield from reading(channel, found.state, task.mission_type, task.options, found.recheck)
+    home = task.mission.home if task.mission else None
+    found.mission = Mission.from_wire(task.autopilot, read.items, home=home, name=task.name, sysid=task.sysid)
+    return found
+
+
 def uploading(channel: Channel, task: Task) -> LinkSteps[UploadResult]:
     """Find the vehicle, run preflight, read parameters, upload and verify. Raises VehicleRefused, LinkError."""
     clock, options = channel.link.clock, task.options
-    watch = Watch(task.sysid)
-    state = yield from finding(channel, watch, options)
-    warnings = _of_link(channel) + preflight(state, task.items, task.autopilot, **_terms(task))
-    recheck = _holding(channel, watch, state, options, lambda now: objections(
-        now, task.items, task.autopilot, **_terms(task)
-    ))  # fmt: skip
-    against, values = yield from reading_parameters(channel, task, state, watch, recheck)
-    warnings += against
-    noted, off = yield from terrain_steps(channel, state.address, task.items, values, options.terrain, recheck.note)
-    warnings += noted
-    values.update(off)
-    failed = None
-    if task.mission and options.read_parameters:
-        failed = yield from judging(channel, task, task.mission, values, recheck)
-    if failed is not None:
-        raise FailsCheck(failed, task.sysid)
+    found = Readied(Watch(task.sysid))
+    state, recheck = yield from readying(channel, task, found)
+    watch, warnings, values = found.watch, found.warnings, found.values
     texts_before = watch.texts_heard
     machine = VerifiedUpload(
         task.items,

@@ -20,7 +20,7 @@ from gcsplan.mavlink.link.prepared_answers import Prepared
 from gcsplan.mavlink.link.session.parameters import decode_value, parameter_name
 from gcsplan.mavlink.link.session.recheck import ASK_AGAIN_S, Recheck, request_message
 from gcsplan.mavlink.link.watch import STANDBY, UNINIT, VehicleState, Watch
-from gcsplan.mavlink.mission.autopilots import is_generic, version_of
+from gcsplan.mavlink.mission.autopilots import PX4, is_generic, version_of
 from gcsplan.mavlink.mission.parameter_names import OnBoard
 from gcsplan.mavlink.protocol import wire
 from gcsplan.mavlink.protocol.machine import CANCELLED_BY_US, TransferProgress
@@ -28,6 +28,7 @@ from gcsplan.mavlink.protocol.messages import Address, Item, Packet, Request
 from gcsplan.mavlink.protocol.outcome import Outcome, Unknown
 
 _AUTOPILOT_VERSION, _GLOBAL_POSITION_INT, _HOME_POSITION = 148, 33, 242
+_WIND, _WIND_COV = 168, 231
 _DOES_NOT_EXIST = 1  # MAV_PARAM_ERROR
 _MOST_REQUESTS, _MOST_REQUESTS_OF_GENERIC = 4, 2  # a vehicle with a generic autopilot may never report a position
 _ASK_AGAIN_MOST_S, _SLOWER = 4.0, 1.5
@@ -150,6 +151,25 @@ def parameter_steps(
                 unknown.add(name)
                 values.absent = frozenset(unknown)
     return values
+
+
+def ask_wind(channel: Channel, state: VehicleState) -> None:
+    """Request the vehicle's estimate of the wind, in the message that its autopilot has for it."""
+    channel.send(request_message(state.address, _WIND_COV if state.mav_autopilot == PX4 else _WIND), state.address)
+
+
+def wind_steps(channel: Channel, state: VehicleState, recheck: Recheck, until: float) -> LinkSteps[VehicleState]:
+    """Return what the vehicle reports, with its estimate of the wind if that arrives before ``until``."""
+    clock = channel.link.clock
+    ask_at = clock() + ASK_AGAIN_S
+    while (now := clock()) < until and (recheck.watch.state(now) or state).wind is None:
+        if now >= ask_at:
+            ask_wind(channel, state)
+            ask_at = now + ASK_AGAIN_S
+        yield min(ask_at, until)
+        for heard in channel.take():
+            recheck.note(heard, clock())
+    return recheck.watch.state(clock()) or state
 
 
 def dead_link(link: Link, sysid: int, timeout_s: float) -> LinkError:
