@@ -112,10 +112,11 @@ def _page(mission: dict[str, Any], folder: Path) -> Iterator[_Client]:
     from gcsplan.page.edits import Edits
     from gcsplan.page.map_session import MapSession
     from gcsplan.page.server import HOST, MapServer
+    from gcsplan.page.steps.flight_steps import PageSteps
 
     file = Path(tempfile.mkdtemp(dir=folder)) / "bench.yaml"  # edits that are kept are of this mission alone
     file.write_text(yaml.safe_dump(mission), encoding="utf-8")
-    session = MapSession(Edits.of_file(file), METRIC)
+    session = MapSession(Edits.of_file(file), METRIC, PageSteps)
     server = MapServer(session)
     server.start()
     origin = {"Origin": f"http://{HOST}:{server.port}"}

@@ -13,7 +13,8 @@ LINK_TEXTS = {
     "vehicle_type_not_told": "the vehicle does not say whether it is what {autopilot} flies",
     "vehicle_state_not_told": "the vehicle does not report its state: whether it is ready could not be checked",
     "wind_as_declared": (
-        "the vehicle estimates a wind of {speed_m_s:speed.1} from {from_deg:.0f}°, which is within the plan's ({declared})"
+        "the vehicle estimates a wind of {speed_m_s:speed.1} from {from_deg:.0f}°, which is within the plan's "
+        "({declared})"
     ),
     "wind_not_as_declared": (
         "the vehicle estimates a wind of {speed_m_s:speed.1} from {from_deg:.0f}°, {away_m_s:speed.1} from the nearest "

@@ -89,7 +89,7 @@ def _vehicle(number: int, v: VehiclePlan, plan: Plan, home: WayHome | None, unit
     line = line_of(verdict, plan.world, v.request.vehicle.limits, samples=PROFILE_SAMPLES)
     notes = [note.text(wording) for note in v.all_notes(plan.fleet)]
     return {
-        "vehicle": number, "name": v.name, "verdict": _word(_flies(v, plan, home)), "line": _flown(verdict),
+        "vehicle": number, "name": v.name, "verdict": _word(_flies(v, plan, home)), "line": flown_line(verdict),
         "cost": v.cost, "bound": v.solution.lower_bound, "gap_percent": v.gap_percent, "length_m": verdict.length_m,
         "time_s": verdict.time_s, "energy_j": verdict.reported_j(verdict.energy_j),
         "figures": figures(v, home, units),
@@ -203,7 +203,8 @@ def _numbers(values: Floats, decimals: int) -> list[float | None]:
     return [round(v, decimals) if math.isfinite(v) else None for v in values.tolist()]
 
 
-def _flown(verdict: Verdict) -> list[float]:
+def flown_line(verdict: Verdict) -> list[float]:
+    """The line of a mission as it is flown: latitude, longitude, metres AMSL, again and again."""
     if not verdict.legs:
         return []
     places = np.array([verdict.legs[0].start, *(leg.end for leg in verdict.legs)])

@@ -74,7 +74,9 @@ class Guard:
 
         async def with_headers(message: MutableMapping[str, Any]) -> None:
             if message["type"] == "http.response.start":
-                message["headers"] = [*message.get("headers", []), *self._headers]
+                own = [*message.get("headers", [])]
+                known = {name.lower() for name, _ in own}
+                message["headers"] = [*own, *(row for row in self._headers if row[0] not in known)]
             await send(message)
 
         await self._app(inner, receive, with_headers)

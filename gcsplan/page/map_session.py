@@ -10,10 +10,10 @@ import queue
 import re
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from gcsplan.app.plan.model import Plan
 from gcsplan.app.plan.way_home import home_of, homes_of, is_required
@@ -55,14 +55,42 @@ SPARE_DEG = 0.01
 """Degrees around a mission where the map opens."""
 
 
+class StepTaker(Protocol):
+    """What takes the steps from the page to files and vehicles: `gcsplan.page.steps`, which knows this session."""
+
+    report: str
+
+    @property
+    def kinds(self) -> Collection[str]:
+        """The types of messages that are steps."""
+
+    def take(self, message: Mapping[str, Any]) -> None:
+        """Follow such a message. Raises PageError, InputError."""
+
+    def show(self, plan: Plan) -> int:
+        """Note the plan that the page shows from now on; returns its number."""
+
+    def state(self, n: int) -> PageMessage:
+        """An answer with the steps' state, for a page that comes."""
+
+    def left(self) -> None:
+        """Note that the page is gone, or another one came."""
+
+    def close(self) -> str:
+        """End all conversations; returns words on the vehicles of an upload that was broken off, else nothing."""
+
+
+StepsMaker = Callable[[Edits, SendAnswer, Callable[[], Units]], StepTaker]
+
+
 class _Enough(Exception):
     """A live plan has its path."""
 
 
 class MapSession:
-    """The state behind one page. ``send`` is called with each answer, from the session's thread."""
+    """The state behind one page. ``steps`` makes what takes its steps to files and vehicles."""
 
-    def __init__(self, edits: Edits, units: Units, base: PageMessage | None = None) -> None:
+    def __init__(self, edits: Edits, units: Units, steps: StepsMaker, base: PageMessage | None = None) -> None:
         self._edits, self._units, self._base = edits, units, base
         self._send: SendAnswer = lambda answer: None
         self._waiting: queue.SimpleQueue[PageMessage | None] = queue.SimpleQueue()
@@ -72,6 +100,7 @@ class MapSession:
         self._planning_live: bool | None = None
         self._begun_s, self._patience_s = 0.0, LIVE_S
         self._owed = False
+        self._homeless: tuple[int, Plan] | None = None  # a plan, with its n, whose way home is to be sent
         self._costs: dict[str, float] = {}
         self._problems: tuple[Mistake, ...] = ()
         self._zones = KeptWorld()
@@ -85,6 +114,7 @@ class MapSession:
         self._disk = edits.store.disk()
         self._unkept = False
         self._failed_to_keep = ""
+        self.steps = steps(edits, lambda answer: self._send(answer), lambda: self._units)
         self._thread = threading.Thread(target=self._run, name="map session", daemon=True)
         self._thread.start()
 
@@ -92,6 +122,7 @@ class MapSession:
 
     def attach(self, send: SendAnswer) -> None:
         """Send all answers there from now on."""
+        self.steps.left()
         self._send = send
 
     def hand_in(self, message: PageMessage) -> None:
@@ -125,6 +156,7 @@ class MapSession:
         if self._edits.planner is not None:
             self._edits.planner.cancel()
         self._thread.join()
+        self.steps.close()
         return self._edits.store.edits if self._edits.keep() else None
 
     # -- the session's thread ------------------------------------------------------------------------------------
@@ -183,7 +215,10 @@ class MapSession:
             self._send(answers.error_answer(self._n, GcsplanError(f"a bug of gcsplan: {why!r}"), "internal"))
             plans = False
         if (plans or self._owed) and self._edits.planner is not None:
+            self._homeless = None
             self._plan(live=_is_live(message))
+        else:
+            self._send_home()
 
     def _do(self, message: PageMessage) -> bool:
         """Follow a message; whether a plan follows. Raises PageError, InputError."""
@@ -223,9 +258,13 @@ class MapSession:
             self._shows_scene = message.get("on") is True
             self._send_scene()
             return False
+        elif kind in self.steps.kinds:
+            self.steps.take(message)
+            return False
         elif kind == "hello":
             edits.cancel()  # a page that comes again has dropped what it dragged
             self._shows_scene = False
+            self._send(self.steps.state(self._n))
         else:
             raise PageError("this type of message is not known", code="bad_message", where="type")
         self._problems = ()
@@ -313,14 +352,21 @@ class MapSession:
         """Send the certificate, then the way home, which is judged before it if the mission requires a safe one."""
         required = is_required(plan.source, option=False)
         homes = homes_of(plan) if required else {}
-        self._send(answers.plan_answer(n, plan, homes, self._units, elapsed_s))
+        self._send(answers.plan_answer(n, plan, homes, self._units, elapsed_s) | {"plan": self.steps.show(plan)})
         self._send_scene()
-        if required:
+        self._homeless = None if required else (n, plan)
+        self._send_home()
+
+    def _send_home(self) -> None:
+        """Send the way home of the newest plan, unless it was sent or a message waits."""
+        if self._homeless is None:
             return
+        n, plan = self._homeless
         with suppress(Cancelled), cancelled_by(lambda: self._superseded):
             found: dict[str, WayHome] = {
                 v.name: home_of(v.verdict, v.request, plan.world, plan.source.terrain_error_m) for v in plan.vehicles
             }
+            self._homeless = None
             self._send(answers.home_answer(n, plan, found, self._units))
 
     def _send_scene(self) -> None:

@@ -7,8 +7,9 @@ from typing import Literal
 from gcsplan.errors import InputError
 
 PageCode = Literal[
-    "bad_message", "bad_change", "bad_mission", "changed_on_disk", "exists", "not_saved", "taken_over", "internal"
-]
+    "bad_message", "bad_change", "bad_mission", "changed_on_disk", "exists", "not_saved", "taken_over", "internal",
+    "not_sent"
+]  # fmt: skip
 
 
 class PageError(InputError):

@@ -61,6 +61,9 @@ TAKEN_OVER, TOO_MANY = 4000, 4008
 LEAVE_S = 2
 """Seconds that open connections get when the server ends."""
 
+REPORT_POLICY = "sandbox allow-scripts allow-modals; frame-ancestors 'none'"
+"""Beside the report's own policy, which allows its one script and no request at all."""
+
 ForClient = Mapping[str, str]
 CACHED: ForClient = {"cache-control": "private, max-age=86400"}
 LOOKED_UP: ForClient = {"cache-control": "no-cache"}
@@ -130,6 +133,7 @@ class MapServer:
                 Route("/", self._file),
                 Route("/terrain/{revision:int}/{z:int}/{x:int}/{y:int}.png", self._terrain),
                 Route("/contours/{revision:int}/{units}/{z:int}/{x:int}/{y:int}.json", self._contours),
+                Route("/report.html", self._report),
                 Route("/base/{z:int}/{x:int}/{y:int}", self._base_tile),
                 WebSocketRoute("/socket", self._talk),
                 Route("/{path:path}", self._file),
@@ -142,6 +146,13 @@ class MapServer:
         if file is None:
             return Response("not found\n", status_code=404, media_type="text/plain")
         return FileResponse(file, media_type=MEDIA_TYPES[file.suffix], headers=dict(LOOKED_UP))
+
+    async def _report(self, _: Request) -> Response:
+        """The newest report that was written, as a page that reaches neither the map's page nor its server."""
+        text = self._session.steps.report
+        if not text:
+            return Response("no report was written yet\n", status_code=404, media_type="text/plain")
+        return Response(text, media_type="text/html", headers={"content-security-policy": REPORT_POLICY, **LOOKED_UP})
 
     async def _terrain(self, request: Request) -> Response:
         place = (int(request.path_params[key]) for key in ("revision", "z", "x", "y"))
@@ -190,6 +201,7 @@ class MapServer:
             sending.cancel()
             if self._page is page:
                 self._page = None
+                self._session.steps.left()
 
 
 async def _sent(page: WebSocket, outward: asyncio.Queue[PageMessage]) -> None:

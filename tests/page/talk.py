@@ -16,6 +16,7 @@ from websockets.sync.client import ClientConnection, connect
 from gcsplan.page.edits import Edits
 from gcsplan.page.map_session import MapSession
 from gcsplan.page.server import MapServer
+from gcsplan.page.steps.flight_steps import PageSteps
 from gcsplan.units import METRIC
 
 ANSWER_S = 30.0
@@ -103,7 +104,7 @@ class Page:
 @contextmanager
 def serving(mission: Path | None, folder: Path) -> Iterator[MapServer]:
     """A server of a mission, or of none in a folder."""
-    session = MapSession(Edits.of_folder(folder) if mission is None else Edits.of_file(mission), METRIC)
+    session = MapSession(Edits.of_folder(folder) if mission is None else Edits.of_file(mission), METRIC, PageSteps)
     server = MapServer(session)
     server.start()
     try:

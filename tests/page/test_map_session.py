@@ -17,6 +17,7 @@ from gcsplan.app.fleet.pipeline import load_mission, plan
 from gcsplan.errors import InputError
 from gcsplan.page.edits import Edits
 from gcsplan.page.map_session import MapSession
+from gcsplan.page.steps.flight_steps import PageSteps
 from gcsplan.units import METRIC
 
 ANSWER_S = 20.0
@@ -69,7 +70,7 @@ class Desk:
 
 @contextmanager
 def desk_of(mission: Path | None, folder: Path) -> Iterator[Desk]:
-    session = MapSession(Edits.of_folder(folder) if mission is None else Edits.of_file(mission), METRIC)
+    session = MapSession(Edits.of_folder(folder) if mission is None else Edits.of_file(mission), METRIC, PageSteps)
     try:
         yield Desk(session)
     finally:
@@ -276,7 +277,7 @@ def test_a_save_never_leaves_the_folder(desk: Desk, name: object, file: Path) ->
 
 @pytest.mark.slow
 def test_edits_that_are_not_saved_are_found_again(file: Path) -> None:
-    session = MapSession(Edits.of_file(file), METRIC)
+    session = MapSession(Edits.of_file(file), METRIC, PageSteps)
     desk = Desk(session)
     desk.ask("hello", "plan")
     desk.ask("change", "plan", changes={GOAL: [46.515, 8.51]})
@@ -296,7 +297,7 @@ def test_edits_that_are_not_saved_are_found_again(file: Path) -> None:
 
 
 def test_edits_of_another_state_of_the_file_are_not_written_over_it(file: Path) -> None:
-    session = MapSession(Edits.of_file(file), METRIC)
+    session = MapSession(Edits.of_file(file), METRIC, PageSteps)
     desk = Desk(session)
     desk.ask("hello", "plan")
     desk.ask("change", "plan", changes={GOAL: [46.515, 8.51]})

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -24,6 +24,16 @@ from gcsplan.world.terrain.grid import GroundHeights
 from gcsplan.world.world import World
 
 SIM, LINK = "sim", "link"
+
+
+def broken_off(names: Sequence[str]) -> str:
+    """Words on the vehicles with which the user broke off a conversation."""
+    return (
+        f"interrupted while talking to {', '.join(names)}: a transfer under way was broken off, and the vehicle was "
+        f"informed; its mission is now unknown: send it again, or compare with gcsplan verify"
+    )
+
+
 MOST_CELLS = 25_000_000
 """Cells of the widest terrain that is loaded, 400 MB."""
 ProgressCall = Callable[[str, TransferProgress], None]

@@ -50,6 +50,7 @@ if TYPE_CHECKING:
     from gcsplan.check.returns.verdict import WayHome
     from gcsplan.mavlink.link.link import Link
     from gcsplan.mavlink.link.session import session
+    from gcsplan.mavlink.link.session.jobs import Readied
     from gcsplan.mavlink.link.session.results import UploadResult
 
 _log = logging.getLogger(__name__)
@@ -209,23 +210,10 @@ def run_jobs(
     simulator: Simulator | None = None,
 ) -> list[JobResult]:
     """Upload all jobs at once, read back, compare, and check what was read back; results in the order of ``jobs``."""
-    from gcsplan.mavlink.link.link import Link
     from gcsplan.mavlink.link.session import session
 
     with ExitStack() as stack:
-        links: dict[str, Link] = {}  # by job
-        for group in _apart([job for job in jobs if job.url == SIM]):
-            if simulator is None:
-                raise UsageError("nothing here can simulate a vehicle")
-            url = stack.enter_context(simulator([job.mission for job in group]))
-            links |= dict.fromkeys((j.name for j in group), stack.enter_context(Link(url)))  # unsigned: it stays here
-        failed: dict[str, LinkError] = {}
-        for url in dict.fromkeys(job.url for job in jobs if job.url != SIM):
-            try:
-                link = stack.enter_context(open_link(url))
-                links |= dict.fromkeys((j.name for j in jobs if j.url == url), link)
-            except LinkError as error:  # the other vehicles' links may work
-                failed[url] = error
+        links, failed = _links_of(jobs, stack, simulator)
         if failed and options.atomic:  # nothing has been sent yet, so every vehicle can keep its old mission
             where = ", ".join(failed)
             held = LinkError(f"nothing was sent, all or nothing: the link {where} did not open")
@@ -237,18 +225,7 @@ def run_jobs(
                 "nothing was sent but fences and rally points, all or nothing: another vehicle's are not on board"
             )
             return [_result(job, barred.get(job.name) or held) for job in jobs]
-        orders = {
-            job.name: order_of(
-                job,
-                links[job.name],
-                options,
-                progress,
-                simulated=job.url == SIM,
-                listen_s=0.0 if job.url == SIM else LISTEN_S,
-            )
-            for job in jobs
-            if job.name in links and job.name not in barred
-        }
+        orders = _orders([job for job in jobs if job.name not in barred], links, options, progress)
         _log.info("uploading to %s", ", ".join(orders) or "no vehicle")
         results = session.upload_fleet(list(orders.values()), ended=report_end(progress))
         ended = dict(zip(orders, results, strict=True))
@@ -266,6 +243,57 @@ def run_jobs(
         for result in done:
             _log.info("%s: %s", result.vehicle, result.outcome)
         return rolled_back(done, orders, ended) if options.atomic else done
+
+
+def _links_of(
+    jobs: Sequence[UploadJob], stack: ExitStack, simulator: Simulator | None
+) -> tuple[dict[str, Link], dict[str, LinkError]]:
+    """The open links by job, which ``stack`` closes, and by URL why one did not open, which ends no other one."""
+    from gcsplan.mavlink.link.link import Link
+
+    links: dict[str, Link] = {}
+    for group in _apart([job for job in jobs if job.url == SIM]):
+        if simulator is None:
+            raise UsageError("nothing here can simulate a vehicle")
+        url = stack.enter_context(simulator([job.mission for job in group]))
+        links |= dict.fromkeys((j.name for j in group), stack.enter_context(Link(url)))  # unsigned: it stays here
+    failed: dict[str, LinkError] = {}
+    for url in dict.fromkeys(job.url for job in jobs if job.url != SIM):
+        try:
+            link = stack.enter_context(open_link(url))
+            links |= dict.fromkeys((j.name for j in jobs if j.url == url), link)
+        except LinkError as error:
+            failed[url] = error
+    return links, failed
+
+
+def _orders(
+    jobs: Sequence[UploadJob], links: Mapping[str, Link], options: UploadOptions, progress: ProgressCall | None
+) -> dict[str, session.UploadOrder]:
+    """The orders of the jobs whose links are open, by name."""
+    return {
+        job.name: order_of(
+            job, links[job.name], options, progress, simulated=job.url == SIM,
+            listen_s=0.0 if job.url == SIM else LISTEN_S,
+        )
+        for job in jobs if job.name in links
+    }  # fmt: skip
+
+
+def look(
+    jobs: Sequence[UploadJob], options: UploadOptions, *, simulator: Simulator | None = None
+) -> dict[str, Readied | GcsplanError]:
+    """What an upload of each job would meet, all at once, by name; nothing is written to a vehicle.
+
+    The checks are those of `run_jobs` up to the first item; an error says why a vehicle could not be looked at.
+    """
+    from gcsplan.mavlink.link.session import session
+
+    with ExitStack() as stack:
+        links, failed = _links_of(jobs, stack, simulator)
+        orders = _orders(jobs, links, options, None)
+        seen = dict(zip(orders, session.look_fleet(list(orders.values())), strict=True))
+    return {job.name: seen.get(job.name) or failed[job.url] for job in jobs}
 
 
 def order_of(

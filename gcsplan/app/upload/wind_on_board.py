@@ -34,7 +34,7 @@ def flight_wind_of(job: UploadJob) -> FlightWind:
 
 
 def wind_judge(job: UploadJob) -> WindJudge | None:
-    """What is said of a vehicle's estimate; None without a world, where no wind was counted."""
+    """The notes on a vehicle's estimate; None without a world, where no wind was counted."""
     world, flies_in = job.world, flight_wind_of(job)
     if world is None or job.verdict is None:
         return None
@@ -52,9 +52,9 @@ def wind_judge(job: UploadJob) -> WindJudge | None:
         vector = found.east_m_s, found.north_m_s
         away_m_s = min(declared.away_m_s(vector, amsl_m, agl_m, at_s + job.waits_s) for at_s in flies_in.departs_s)
         within_m_s = declared.gusts_add_m_s + max(SURE_M_S, DEVIATIONS * found.deviation_m_s)
-        said = {"speed_m_s": found.speed_m_s, "from_deg": found.from_deg, "declared": wind_note(declared)}
+        speed_m_s, from_deg, winds = found.speed_m_s, found.from_deg, wind_note(declared)
         if away_m_s <= within_m_s:
-            return Note("wind_as_declared", **said)
-        return Note("wind_not_as_declared", **said, away_m_s=away_m_s)
+            return Note("wind_as_declared", speed_m_s=speed_m_s, from_deg=from_deg, declared=winds)
+        return Note("wind_not_as_declared", speed_m_s=speed_m_s, from_deg=from_deg, declared=winds, away_m_s=away_m_s)
 
     return beside

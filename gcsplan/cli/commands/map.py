@@ -43,12 +43,13 @@ def map_(
     from gcsplan.page.edits import Edits
     from gcsplan.page.map_session import MapSession
     from gcsplan.page.server import MapServer, files_served
+    from gcsplan.page.steps.flight_steps import PageSteps
     from gcsplan.units import units_of
 
     files_served()  # before the mission is read: the extra may be missing
     below = None if base is None else BaseMap(base)
     edits = Edits.of_folder(Path()) if mission is None else Edits.of_file(mission)
-    session = MapSession(edits, units_of(units.value), None if below is None else below.as_dict())
+    session = MapSession(edits, units_of(units.value), PageSteps, None if below is None else below.as_dict())
     try:
         server = MapServer(session, port=port, base=below)
         server.start()
@@ -62,6 +63,9 @@ def map_(
         finally:
             server.stop()
     finally:
+        broken_off = session.steps.close()
+        if broken_off:
+            remark(broken_off)
         kept = session.close()
         if kept is not None:
             remark(f"note: edits that are not saved are kept in {kept}; the next gcsplan map of this mission has them")

@@ -57,11 +57,10 @@ from gcsplan.errors import CheckFailed, InputError, NoMission, UsageError
 
 if TYPE_CHECKING:
     from gcsplan.app.fleet.start_time import GateTime
+    from gcsplan.app.output.handout import Handout
     from gcsplan.app.plan.earlier import EarlierMission
     from gcsplan.app.plan.model import Plan
     from gcsplan.app.upload.job import JobResult, UploadJob
-    from gcsplan.check.difference import PlanDifference
-    from gcsplan.check.returns.verdict import WayHome
     from gcsplan.mission_file import MissionFile
     from gcsplan.mission_file.changes import MissionChange
     from gcsplan.notes.note import Note
@@ -203,9 +202,9 @@ def plan(
     a whole fleet, unless it may be left out.
     """
     from gcsplan.app.fleet import pipeline
-    from gcsplan.app.fleet.may_fly import flyable
     from gcsplan.app.fleet.start_time import GateTime
     from gcsplan.app.output import files as outputs
+    from gcsplan.app.output.handout import handout
     from gcsplan.cli.output.console import release_table, remark, upload_table
     from gcsplan.export.outdir import settle_outputs
     from gcsplan.mission_file.source import file_of
@@ -246,15 +245,12 @@ def plan(
             planned = _plan(source, how)
         keep = _keeping(source, mission, save=save or (apply and bool(best)))
         home = report or way_home or rally or apply
-        planned, homes = flyable(planned, allow_unjudged=allow_unjudged, home=home, require_way_home=require_way_home)
-        homes = _with_earlier_landing(planned, homes)
-        lists = (fence, rally, fence_infinite)
-        orders, list_notes = _orders(planned, targets, homes, require_way_home, lists)
-        fences = {job.name: job.fence.items for job in orders if job.fence is not None}
-        changes_since = _differences(planned, earlier)
-        files = outputs.outputs_of(planned, homes, fences, rally=rally)
-        if report:
-            files["report.html"] = outputs.report_of(planned, (), homes, system, changes_since)
+        handed = handout(
+            planned, targets, (fence, rally, fence_infinite), earlier, allow_unjudged=allow_unjudged, home=home,
+            require_way_home=require_way_home,
+        )  # fmt: skip
+        planned, homes = handed.plan, handed.homes
+        files = handed.files(system if report else None)
     except UsageError:
         raise  # a mistake on the command line does not invalidate an earlier mission
     except (InputError, NoMission, CheckFailed):
@@ -264,22 +260,22 @@ def plan(
     _write(directory, files, pictures, later=["upload.json"] if targets else [])
     keep()
     if not as_json:
-        _show(planned, homes, changes_since, system)
-        _say_written(directory, list(files), list_notes, system)
+        _show(handed, system)
+        _say_written(directory, list(files), handed.notes, system)
     results: list[JobResult] = []
     if targets:
         results = _upload(
-            orders, gate, allow_armed=allow_armed, ignore_position=ignore_position, allow_parameters=allow_parameters,
-            atomic=atomic, timeout_s=timeout,
+            handed.jobs, gate, allow_armed=allow_armed, ignore_position=ignore_position, atomic=atomic,
+            allow_parameters=allow_parameters, timeout_s=timeout,
         )  # fmt: skip
-        _add_results(directory, planned, results, homes, system if report else None, changes_since)
+        _add_results(directory, handed, results, system if report else None)
         if not as_json:
             upload_table(results, units=system)
             release_table(planned, results, gate)
     left_out = _left_out(planned, mission)
     failure = (uploads.failure(results) if targets else None) or left_out
     if as_json:
-        more = in_json("changes", source.changes) | {"differences": [d.as_dict() for d in changes_since]}
+        more = in_json("changes", source.changes) | {"differences": [d.as_dict() for d in handed.differences]}
         emit(outputs.summary_of(planned, results, homes) | more, failure)
     raise typer.Exit(failure["code"] if failure is not None else 0)
 
@@ -315,44 +311,15 @@ def _earlier(
     return found
 
 
-def _differences(planned: Plan, earlier: Sequence[Mapping[str, EarlierMission]]) -> list[PlanDifference]:
-    """What changed for each vehicle, by the missions that it is compared with."""
-    if not any(earlier):
-        return []
-    from gcsplan.app.plan.earlier import differences
-
-    return [difference for missions in earlier for difference in differences(planned, missions).values()]
-
-
-def _orders(
-    planned: Plan, targets: Mapping[str, str], homes: Mapping[str, WayHome], require_way_home: bool,
-    lists: tuple[bool, bool, bool],
-) -> tuple[list[UploadJob], Sequence[tuple[str, Note]]]:  # fmt: skip
-    """What is sent to each vehicle, with its ``lists`` (fence, rally points, infinite fence), and the notes on them.
-
-    A fence that the mission would breach is refused here, before anything is written.
-    """
-    fence, rally, infinite = lists
-    if not (targets or fence or infinite):
-        return [], ()
-    from gcsplan.app.plan.way_home import is_required
-    from gcsplan.app.upload import fence as fencing
-    from gcsplan.app.upload import run as uploads
-
-    where = targets or dict.fromkeys((v.name for v in planned.vehicles), "")
-    orders = uploads.jobs_of(planned, where, homes, is_required(planned.source, require_way_home), rally=rally)
-    return fencing.with_lists(orders, fencing.ListsSent(fence, rally, infinite)) if orders else ([], ())
-
-
-def _show(planned: Plan, homes: Mapping[str, WayHome], changes_since: Sequence[PlanDifference], units: Units) -> None:
+def _show(handed: Handout, units: Units) -> None:
     """Print the plan, what changed, and the ways home."""
     from gcsplan.cli.output.console import plan_table
     from gcsplan.cli.output.difference_table import say_differences
     from gcsplan.cli.output.verdict_table import say_homes
 
-    plan_table(planned, homes, units)
-    say_differences(changes_since, units)
-    say_homes(homes, units)
+    plan_table(handed.plan, handed.homes, units)
+    say_differences(handed.differences, units)
+    say_homes(handed.homes, units)
 
 
 def _plan(source: MissionFile, how: Mapping[str, Any]) -> Plan:
@@ -376,15 +343,6 @@ def _best_changes(planned: Plan) -> list[MissionChange]:
         if home.safe is not True and not best_changes({name: home}):
             remark(f"note: --apply: no key that was tried makes more of the way home of {name} safe")
     return best_changes(homes)
-
-
-def _with_earlier_landing(planned: Plan, homes: dict[str, WayHome]) -> dict[str, WayHome]:
-    """The ways home, with an earlier landing among the proposals where all others leave something unsafe."""
-    if all(home.safe is not False for home in homes.values()):
-        return homes
-    from gcsplan.app.fleet.earlier_landing import with_earlier_landing
-
-    return with_earlier_landing(planned, homes)
 
 
 def _begin_changes(source: MissionFile, *, save: bool) -> None:
@@ -417,16 +375,13 @@ def _keeping(source: MissionFile, mission: Path, *, save: bool) -> Callable[[], 
     return lambda: None
 
 
-def _add_results(
-    directory: Path, planned: Plan, results: list[JobResult], homes: Mapping[str, WayHome], report: Units | None,
-    changes_since: Sequence[PlanDifference],
-) -> None:  # fmt: skip
+def _add_results(directory: Path, handed: Handout, results: list[JobResult], report: Units | None) -> None:
     """Add what an upload came to; ``report``: the units of a report that tells it too, None without one."""
     from gcsplan.app.output import files as outputs
 
-    texts = {"upload.json": lambda: outputs.upload_text(planned, results, homes)}
+    texts = {"upload.json": lambda: outputs.upload_text(handed.plan, results, handed.homes)}
     if report is not None:
-        texts["report.html"] = lambda: outputs.report_of(planned, results, homes, report, changes_since)
+        texts["report.html"] = lambda: handed.report(results, report)
     _add(directory, texts)
 
 
@@ -547,7 +502,7 @@ def _pictures(planned: Plan, png: Path, each: bool) -> dict[Path, bytes]:
     return {png: outputs.picture_of(planned, png.suffix.lower()[1:])}
 
 
-def _upload(jobs: list[UploadJob], gate: GateTime | None, **options: Any) -> list[JobResult]:
+def _upload(jobs: Sequence[UploadJob], gate: GateTime | None, **options: Any) -> list[JobResult]:
     """Upload all jobs with their progress shown; ``options`` are those of `UploadOptions`."""
     from gcsplan.app.upload import run as uploads
     from gcsplan.app.upload.job import UploadOptions

@@ -186,10 +186,9 @@ def talking(names: Sequence[str]) -> Iterator[None]:
     try:
         yield
     except KeyboardInterrupt:
-        raise interrupted(
-            f"interrupted while talking to {', '.join(names)}: a transfer under way was broken off, and the vehicle "
-            f"was informed; its mission is now unknown: send it again, or compare with gcsplan verify"
-        ) from None
+        from gcsplan.app.upload.job import broken_off
+
+        raise interrupted(broken_off(names)) from None
 
 
 def speak_plainly() -> None:

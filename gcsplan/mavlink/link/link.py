@@ -17,7 +17,7 @@ from typing import Any, Generic, TypeVar
 
 import pymavlink.dialects.v20.ardupilotmega as dialect
 
-from gcsplan.errors import GcsplanError
+from gcsplan.errors import GcsplanError, heed_cancel
 from gcsplan.mavlink.link.frames import FrameParser, FrameWriter, Signing, SigningKey
 from gcsplan.mavlink.link.prepared_answers import Prepared, PromptAnswers
 from gcsplan.mavlink.link.transport import LinkClock, Peer, Transport, Udp, open_transport, wait_readable
@@ -313,7 +313,7 @@ def pump(jobs: Sequence[PumpJob[T]], *, most: int | None = None, most_on_link: i
 
     At most ``most`` run at a time, and ``most_on_link`` of each link (None: all). The others wait for their turn in
     their order, and their channels hear nothing until then, so that a job sees its vehicle as it is when its turn
-    comes, and nothing piles up.
+    comes, and nothing piles up. Whoever cancels (`errors.cancelled_by`) ends all of them, as Ctrl-C does.
     """
     if not jobs:
         return
@@ -322,6 +322,7 @@ def pump(jobs: Sequence[PumpJob[T]], *, most: int | None = None, most_on_link: i
     turns = _LinkTurns(jobs, most or len(jobs), most_on_link or len(jobs))
     try:
         while True:
+            heed_cancel()
             now = clock()
             turns.begin()
             every: list[PumpJob[Any]] = [*turns.active, *(job for link in links for job in link.background)]

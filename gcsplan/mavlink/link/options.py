@@ -73,7 +73,7 @@ ReadBackJudge = Callable[[Mission, Mapping[str, float]], Note | None]
 
 
 WindJudge = Callable[[VehicleState], Note | None]
-"""Holds the vehicle's estimate of the wind, or that there is none, beside the winds of the plan; None: nothing to say."""
+"""Holds the vehicle's estimate of the wind, or that it has none, beside the winds of the plan; None: nothing to say."""
 
 
 @dataclass(frozen=True, slots=True)

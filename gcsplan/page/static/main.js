@@ -6,7 +6,9 @@ import { banner, startBar } from './bar.js';
 import { startContours } from './contours.js';
 import { startFromNothing } from './start.js';
 import { startFleet } from './fleet.js';
+import { startFly } from './fly.js';
 import { startGrips } from './grips.js';
+import { startHints } from './hints.js';
 import { startLimits } from './limits.js';
 import { showState, startMap } from './map.js';
 import { startModes } from './modes.js';
@@ -19,6 +21,7 @@ import { startScenery } from './scenery.js';
 import { startShapes } from './shapes.js';
 import { startSpace } from './space.js';
 import { startTimeline } from './timeline.js';
+import { startVehicles } from './vehicles.js';
 import { startZoneList } from './zonelist.js';
 import { startZones } from './zones.js';
 
@@ -33,6 +36,8 @@ function start() {
   startContours();
   startShapes();
   startGrips();
+  startVehicles();
+  startHints();
   startModes();
   startRoute();
   startZones();
@@ -41,7 +46,7 @@ function start() {
   startTimeline();
   startReplayBar();
   startSpace();
-  const panel = byId('panel'), parts = [startResult(), startFleet(), startPlaces(), startZoneList(), startLimits()];
+  const panel = byId('panel'), parts = [startResult(), startFleet(), startPlaces(), startZoneList(), startLimits(), startFly()];
   on('state', (state) => { if (state.stage !== 'empty' && !panel.contains(parts[0])) panel.replaceChildren(...parts); });
   startFromNothing(panel);
   showState();

@@ -1,4 +1,4 @@
-"""The vehicle's estimate of the wind beside the declared winds: what is among them, and what is said before an upload."""
+"""The vehicle's estimate of the wind beside the declared winds: what is among them, and what an upload says."""
 
 from __future__ import annotations
 
@@ -68,7 +68,10 @@ def test_the_distance_to_a_set_is_that_to_the_nearest_of_many_winds_of_it(seed: 
     rng = np.random.default_rng(seed)
     speeds, turns = np.sort(rng.uniform(0.0, 20.0, 2)), np.sort(rng.uniform(0.0, 360.0, 2))
     wind = DeclaredWind(speeds[None, None], turns[None, None])
-    drawn_m_s, drawn_rad = rng.uniform(*speeds, 200_000), np.radians(rng.uniform(*turns, 200_000))
+    drawn_m_s, drawn_rad = (
+        rng.uniform(speeds[0], speeds[1], 200_000),
+        np.radians(rng.uniform(turns[0], turns[1], 200_000)),
+    )
     vector = rng.uniform(-25.0, 25.0, 2)
     nearest = np.hypot(vector[0] + drawn_m_s * np.sin(drawn_rad), vector[1] + drawn_m_s * np.cos(drawn_rad)).min()
     assert wind.away_m_s((float(vector[0]), float(vector[1])), 0.0, 0.0, 0.0) == pytest.approx(nearest, abs=0.2)

@@ -16,7 +16,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gcsplan.errors import InputError, LinkError
+from gcsplan.errors import Cancelled, InputError, LinkError, cancelled_by
 from gcsplan.mavlink.link.frames import FrameParser, FrameWriter, Signing, SigningKey, signing_key
 from gcsplan.mavlink.link.link import GCS, Channel, Heard, Link, LinkSteps, PumpJob, pump, run
 from gcsplan.mavlink.link.session.steps import drive
@@ -634,3 +634,21 @@ def test_an_interrupt_cancels_what_runs() -> None:
             pump([PumpJob(channel, drive(upload, channel)), PumpJob(link.channel(2), interrupted())])
         assert str(upload.outcome) == "unknown: cancelled by us"
         assert peer.hear("MISSION_ACK")[0].type == dialect.MAV_MISSION_OPERATION_CANCELLED
+
+
+def test_a_cancel_ends_all_jobs_of_a_pump_each_by_its_own_end() -> None:
+    closed: list[int] = []
+
+    def endless(number: int, link: Link) -> LinkSteps[None]:
+        try:
+            while True:
+                yield link.clock() + 60.0
+        finally:
+            closed.append(number)
+
+    calls = iter([False, False, True])
+    with Link("udpin:127.0.0.1:0", heartbeat_s=None) as link:
+        jobs = [PumpJob(link.channel(n), endless(n, link)) for n in (1, 2)]
+        with cancelled_by(lambda: next(calls)), pytest.raises(Cancelled):
+            pump(jobs)
+    assert closed == [1, 2]

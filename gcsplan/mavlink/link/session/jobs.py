@@ -88,7 +88,6 @@ class Readied:
 
     watch: Watch
     state: VehicleState | None = None
-    recheck: Recheck | None = None
     warnings: list[Note] = field(default_factory=list)
     values: OnBoard = field(default_factory=OnBoard)
     against: GcsplanError | None = None
@@ -102,7 +101,7 @@ def readying(channel: Channel, task: Task, found: Readied) -> LinkSteps[tuple[Ve
     """
     clock, options, watch, warnings = channel.link.clock, task.options, found.watch, found.warnings
     state = found.state = yield from finding(channel, watch, options)
-    recheck = found.recheck = _holding(channel, watch, state, options, lambda now: objections(
+    recheck = _holding(channel, watch, state, options, lambda now: objections(
         now, task.items, task.autopilot, **_terms(task)
     ))  # fmt: skip
     warnings += _of_link(channel)
@@ -139,9 +138,11 @@ def looking(channel: Channel, task: Task) -> LinkSteps[Readied]:
         yield from readying(channel, task, found)
     except VehicleRefused as why:
         found.against = why
-    if found.state is None or found.recheck is None:
+    if found.state is None:
         raise found.against or LinkError("the vehicle was not found", where=f"vehicle {task.sysid}")
-    read = yield from reading(channel, found.state, task.mission_type, task.options, found.recheck)
+    # One that must not be sent to, for it is armed or stands elsewhere, may be read.
+    reader = _holding(channel, found.watch, found.state, replace(task.options, ignore_position=True), _ambiguous)
+    read = yield from reading(channel, found.state, task.mission_type, task.options, reader)
     home = task.mission.home if task.mission else None
     found.mission = Mission.from_wire(task.autopilot, read.items, home=home, name=task.name, sysid=task.sysid)
     return found

@@ -11,14 +11,16 @@ read back, compare), and repeats the caller's check on the list that was read ba
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol, TypeVar
 
 from gcsplan.errors import CheckFailed, GcsplanError, InputError
 from gcsplan.mavlink.link.link import Channel, Link, LinkSteps, PumpJob, pump, run
 from gcsplan.mavlink.link.options import ReadBackJudge, SessionOptions, Task, TransferReport
 from gcsplan.mavlink.link.session.jobs import (
+    Readied,
     clearing,
+    looking,
     looking_at,
     reading,
     uploading,
@@ -46,6 +48,7 @@ __all__ = [
     "discover",
     "download_items",
     "download_mission",
+    "look_fleet",
     "read_vehicle",
     "require_verdict",
     "upload_fleet",
@@ -153,15 +156,33 @@ def upload_fleet(orders: Sequence[UploadOrder], *, ended: EndCall | None = None)
     """
     for order in orders:
         require_verdict(order.mission, order.verdict, unchecked=order.options.unchecked)
-    seats = [(id(order.link), order.mission.sysid) for order in orders]
-    if len(set(seats)) < len(seats):
-        raise InputError("two missions of one fleet are meant for the same system id on the same link")
+    _require_seats(orders)
 
     def starting(order: UploadOrder) -> Callable[[Channel], LinkSteps[UploadResult]]:
         task = Task.of(order.mission, order.options, order.judge, order.progress)
         return lambda channel: _telling(uploading(channel, task), order, ended)
 
     return _together([(order.link, order.mission.sysid, starting(order)) for order in orders])
+
+
+def look_fleet(orders: Sequence[UploadOrder]) -> list[Readied | GcsplanError]:
+    """Check the vehicles of several orders as an upload does before it sends, all at once, and read what they hold.
+
+    Nothing is written, and no verdict is needed. Raises InputError if two missions are for the same vehicle.
+    """
+    _require_seats(orders)
+
+    def starting(order: UploadOrder) -> Callable[[Channel], LinkSteps[Readied]]:
+        task = Task.of(order.mission, replace(order.options, terrain=None), order.judge)
+        return lambda channel: looking(channel, task)
+
+    return _together([(order.link, order.mission.sysid, starting(order)) for order in orders])
+
+
+def _require_seats(orders: Sequence[UploadOrder]) -> None:
+    seats = [(id(order.link), order.mission.sysid) for order in orders]
+    if len(set(seats)) < len(seats):
+        raise InputError("two missions of one fleet are meant for the same system id on the same link")
 
 
 def upload_lists(orders: Sequence[tuple[Link, Task]]) -> list[UploadResult | GcsplanError]:
@@ -191,9 +212,9 @@ def clear_fleet(
 
 
 def _together(
-    starts: Sequence[tuple[Link, int, Callable[[Channel], LinkSteps[UploadResult]]]],
-) -> list[UploadResult | GcsplanError]:
-    jobs: list[PumpJob[UploadResult]] = []
+    starts: Sequence[tuple[Link, int, Callable[[Channel], LinkSteps[T]]]],
+) -> list[T | GcsplanError]:
+    jobs: list[PumpJob[T]] = []
     try:
         for link, sysid, steps in starts:
             channel = link.channel(sysid)
@@ -202,7 +223,7 @@ def _together(
     finally:
         for job in jobs:
             job.channel.link.drop(job.channel)
-    outcomes: list[UploadResult | GcsplanError] = []
+    outcomes: list[T | GcsplanError] = []
     for job in jobs:
         outcome = job.error or job.result
         assert outcome is not None
