@@ -41,8 +41,8 @@ class Mistake:
     """One mistake in the input: its place (``file: key.path``) and what to do about it.
 
     ``code`` is its kind, where programs tell kinds apart, ``meant`` are the names that may have been meant, and
-    ``line`` is the end of the message that says the line, if one is known; ``by`` are other keys whose values make it
-    one.
+    ``line`` is the end of the message that says the line, if one is known, and ``in_line`` the line's number, from 1;
+    ``by`` are other keys whose values make it one.
     """
 
     where: str
@@ -51,6 +51,7 @@ class Mistake:
     meant: tuple[str, ...] = ()
     line: str = ""
     by: tuple[str, ...] = ()
+    in_line: int | None = None
 
     def __str__(self) -> str:
         return f"{self.where}: {self.message}" if self.where else self.message

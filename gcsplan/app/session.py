@@ -162,6 +162,14 @@ class Planner:
         with self._state:
             self._content = _with_keys(self._content, mission)
 
+    def loaded(self) -> MissionFile:
+        """The mission as it is now, as `load_mission` returns it; files are not read again.
+
+        Raises InputError.
+        """
+        with self._planning:
+            return load_content(self._content, self._kept)
+
     def plan(
         self,
         changes: Mapping[str, object] | None = None,

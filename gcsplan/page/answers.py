@@ -58,7 +58,7 @@ def plan_answer(n: int, plan: Plan, homes: Mapping[str, WayHome], units: Units, 
     safe = False if False in verdicts else None if None in verdicts or plan.left_out else True
     notes, numbers = [note.text(wording) for note in dict.fromkeys(plan.notes)], numbers_of(plan)
     return {
-        "type": "plan", "n": n, "verdict": _word(safe), "headline": _headline(plan, homes, wording),
+        "type": "plan", "n": n, "verdict": verdict_word(safe), "headline": _headline(plan, homes, wording),
         "elapsed_ms": round(elapsed_s * 1e3, 1),
         "vehicles": [_vehicle(numbers[v.name], v, plan, homes.get(v.name), units) for v in plan.vehicles],
         "fleet": time_table(plan, units),
@@ -67,7 +67,8 @@ def plan_answer(n: int, plan: Plan, homes: Mapping[str, WayHome], units: Units, 
     }  # fmt: skip
 
 
-def _word(safe: bool | None) -> str:
+def verdict_word(safe: bool | None) -> str:
+    """The protocol's word for a verdict."""
     return {True: "safe", False: "violations", None: "not judged"}[safe]
 
 
@@ -89,12 +90,12 @@ def _vehicle(number: int, v: VehiclePlan, plan: Plan, home: WayHome | None, unit
     line = line_of(verdict, plan.world, v.request.vehicle.limits, samples=PROFILE_SAMPLES)
     notes = [note.text(wording) for note in v.all_notes(plan.fleet)]
     return {
-        "vehicle": number, "name": v.name, "verdict": _word(_flies(v, plan, home)), "line": flown_line(verdict),
+        "vehicle": number, "name": v.name, "verdict": verdict_word(_flies(v, plan, home)), "line": flown_line(verdict),
         "cost": v.cost, "bound": v.solution.lower_bound, "gap_percent": v.gap_percent, "length_m": verdict.length_m,
         "time_s": verdict.time_s, "energy_j": verdict.reported_j(verdict.energy_j),
         "figures": figures(v, home, units),
         "way_home": None if home is None or line is None else _way_home(home, line, plan.world.frame, wording),
-        "profile": None if line is None else _profile(line, plan.world.frame),
+        "profile": None if line is None else profile_of(line, plan.world.frame),
         "findings": [f.note.text(wording) for f in verdict.findings[:MOST_ON_PAGE]],
         "not_judged": [note.text(wording) for note in verdict.not_judged[:MOST_ON_PAGE]],
         "notes": notes[:MOST_ON_PAGE],
@@ -134,7 +135,16 @@ def error_answer(n: int, why: GcsplanError, code: str) -> dict[str, Any]:
     problems = why.problems if isinstance(why, InputError) else ()
     where = problems[0].key if problems else ""
     words = [str(replace(p, where=p.key)) for p in problems[:MOST_ON_PAGE]]
-    return {"type": "error", "n": n, "code": code, "message": "\n".join(words) or str(why), "where": where}
+    lines = [  # of text that is no YAML, the line is the whole place
+        {
+            "line": p.in_line,
+            "where": p.key if p.line or not p.in_line else "",
+            "message": p.message.removesuffix(p.line),
+        }
+        for p in problems[:MOST_ON_PAGE]
+    ]
+    message = "\n".join(words) or str(why)
+    return {"type": "error", "n": n, "code": code, "message": message, "where": where, "problems": lines}
 
 
 def figures(v: VehiclePlan, home: WayHome | None, units: Units) -> list[dict[str, Any]]:
@@ -143,7 +153,7 @@ def figures(v: VehiclePlan, home: WayHome | None, units: Units) -> list[dict[str
     low, high, near = verdict.lowest, verdict.highest, verdict.nearest
     gap = v.gap_percent
     rows = [
-        _figure("verdict", "Verdict", _word(verdict.safe), bad=verdict.safe is not True),
+        _figure("verdict", "Verdict", verdict_word(verdict.safe), bad=verdict.safe is not True),
         _figure("gap", "Longer than the shortest possible by at most", "no bound" if gap is None else f"{gap:.2f} %"),
         _figure("least_agl", "Least height above ground", _height(low, "min_agl_m", "down", units),
                 at=None if low is None else low.min_agl_at, bad=low is not None and low.min_agl_m < limits.min_agl_m),
@@ -189,7 +199,8 @@ def _way_home(home: WayHome, line: TrackLine, frame: Frame, wording: Wording) ->
     return {"safe": home.safe, "unsafe": unsafe, "text": home.headline.text(wording), "rows": rows[:MOST_ON_PAGE]}
 
 
-def _profile(line: TrackLine, frame: Frame) -> dict[str, Any]:
+def profile_of(line: TrackLine, frame: Frame) -> dict[str, Any]:
+    """The samples of a line as lists of equal length."""
     degrees = frame.to_degrees(line.east_m, line.north_m)
     return {
         "distance_m": _numbers(line.run_m, 1), "lat": _numbers(degrees[:, 0], PLACE_DECIMALS),

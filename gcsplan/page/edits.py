@@ -19,10 +19,11 @@ from gcsplan.dem.cache import Cache
 from gcsplan.dem.sources import SOURCES
 from gcsplan.errors import GcsplanError, InputError
 from gcsplan.mission_file import load_mission
+from gcsplan.mission_file.changes import saved_text
 from gcsplan.mission_file.new_file import Draft, place_text, text_of
-from gcsplan.mission_file.source import is_sample
+from gcsplan.mission_file.source import is_sample, read_content
 from gcsplan.page.fleet.crew_changes import with_crew
-from gcsplan.page.form import require_changes
+from gcsplan.page.form import require_changes, require_own_files
 from gcsplan.page.history import EditedDocument, EditHistory
 from gcsplan.page.places import place_of, with_heights
 from gcsplan.page.refused import PageError
@@ -36,6 +37,9 @@ PRESETS = {"copter": Autopilot.ARDUCOPTER, "wing": Autopilot.ARDUPLANE, "px4": A
 
 MOST_FILES, MOST_LOOKED_AT = 200, 5000
 """Most terrain files of the folder that the page offers, and most names of it that are looked at."""
+
+MOST_TEXT_BYTES = 200_000
+"""Most bytes of a mission that is edited as a text on the page: it is one message."""
 
 DRAFT_ENDS = {"vehicles[0].start": "start", "vehicles[0].goal": "goal"}
 """The keys that make a draft a mission."""
@@ -52,7 +56,7 @@ class Edits:
         self._live: dict[str, object] = {}
         self._draft: Draft | None = None
         self._ends: dict[str, Any] = {}
-        self._saved: EditedDocument | None = None
+        self._saved: EditedDocument | None = None  # the state that the file holds
 
     @classmethod
     def of_file(cls, mission: Path) -> Edits:
@@ -63,7 +67,7 @@ class Edits:
         folder = Path() if sample else mission.parent
         edits = cls(MissionStore(folder.absolute(), None if sample else mission.absolute(), source.content.text))
         edits.planner = Planner(source)
-        edits._saved = edits.document
+        edits._saved = edits._state
         if not sample:
             edits._restore(edits.store.kept())
         return edits
@@ -106,7 +110,7 @@ class Edits:
     @property
     def is_saved(self) -> bool:
         """Whether the file holds all edits."""
-        return self.planner is None or self.planner.mission == self._saved
+        return self.planner is None or self._state == self._saved
 
     @property
     def can_undo(self) -> bool:
@@ -135,14 +139,24 @@ class Edits:
         if live:
             self._live |= changes
             return
+        self.make(changes)
+
+    def make(self, changes: Mapping[str, object]) -> None:
+        """Change any keys of a mission, which the server itself has checked; one step of undo. Raises PageError."""
+        assert self.planner is not None
         self._live.clear()
-        before = self.planner.mission
+        before = self._state
         try:
-            self.planner.change(with_crew(before, changes))
+            self.planner.change(with_crew(before["mission"], changes))
         except InputError as why:
             raise PageError(why.message, code="bad_change", where=next(iter(changes))) from why
-        if self.planner.mission != before:
+        if self.planner.mission != before["mission"]:
             self._history.step(before)
+
+    @property
+    def _state(self) -> EditedDocument:
+        """What a step of undo brings back: the document, and the text that it is written into."""
+        return {"mission": self.document, "text": self.store.text}
 
     def cancel(self) -> None:
         """Forget the changes of a drag that was broken off."""
@@ -150,16 +164,49 @@ class Edits:
 
     def undo(self) -> None:
         """Back to the document before the last step."""
-        self._moved(self._history.undo(self.document))
+        self._moved(self._history.undo(self._state))
 
     def redo(self) -> None:
         """Again to the document that was undone."""
-        self._moved(self._history.redo(self.document))
+        self._moved(self._history.redo(self._state))
 
-    def _moved(self, document: EditedDocument | None) -> None:
+    def _moved(self, state: EditedDocument | None) -> None:
         self._live.clear()
-        if document is not None and self.planner is not None:
-            self.planner.restore(document)
+        if state is not None and self.planner is not None:
+            self.planner.restore(state["mission"])
+            self.store.text = state["text"]
+
+    # -- the text ------------------------------------------------------------------------------------------------
+
+    @property
+    def text(self) -> str:
+        """The text that a save would write. Raises PageError."""
+        if self.planner is None or self.store.text is None:
+            raise PageError("there is no text yet: give a start and a goal", code="bad_text")
+        try:
+            text = saved_text(self.store.text, self.planner.mission, self.store.place.name)
+        except InputError as why:
+            raise PageError(str(why), code="bad_text") from why
+        if len(text.encode()) > MOST_TEXT_BYTES:
+            words = f"the text has more than {MOST_TEXT_BYTES} bytes: edit the file itself, the page sees the change"
+            raise PageError(words, code="bad_text")
+        return text
+
+    def write(self, text: object) -> None:
+        """Take a whole text as the mission's own, one step of undo. Raises InputError: the mission stays as it is."""
+        if self.planner is None:
+            raise PageError("there is no mission yet: choose the ground first", code="bad_text")
+        if not isinstance(text, str):
+            raise PageError("the text of a mission is text", code="bad_message", where="text")
+        before, place = self._state, self.store.place
+        _, _, document, _, _ = read_content(place, text)
+        require_own_files(document, before["mission"], self.store.folder, text)  # before any of them is opened
+        load_mission(place, text=text)
+        self.planner.restore(document)
+        self.store.text = text
+        self._live.clear()
+        if self._state != before:
+            self._history.step(before)
 
     # -- files ---------------------------------------------------------------------------------------------------
 
@@ -167,7 +214,7 @@ class Edits:
         """Take the file as it is on the disk; undo leads back to the edits. Raises InputError."""
         if self.planner is None:
             raise PageError("there is no file to read again", code="bad_message")
-        before = self.planner.mission
+        before = self._state
         document, text = self.store.reread()
         load_mission(self.store.place, text=text)
         self.planner.restore(document)
@@ -175,7 +222,7 @@ class Edits:
         self.planner.reload()
         self._history.step(before)
         self._live.clear()
-        self._saved = self.planner.mission
+        self._saved = self._state
 
     def save(self, name: object, *, over: bool) -> Path:
         """Write the mission into its file, or into a new one of the folder. Raises PageError."""
@@ -192,7 +239,7 @@ class Edits:
             )
         file = self.store.save(document, name, over=over)
         self.planner.restore(document)
-        self._saved, self.restored = self.planner.mission, False
+        self._saved, self.restored = self._state, False
         return file
 
     def keep(self) -> bool:
@@ -245,9 +292,9 @@ class Edits:
     def _restore(self, kept: EditedDocument | None) -> None:
         """Take the unsaved edits of an earlier run, which undo takes back."""
         assert self.planner is not None
-        if kept is None or kept == self._saved:
+        if kept is None or {"mission": kept, "text": self.store.text} == self._saved:
             return
-        before = self.planner.mission
+        before = self._saved or self._state
         try:
             self.planner.restore(kept)
         except GcsplanError:

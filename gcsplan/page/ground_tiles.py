@@ -57,6 +57,19 @@ SEA_OFFSET_M = 32768.0
 TileNumber = tuple[int, int, int]
 
 
+def bounds_of(terrain: OpenTerrain) -> list[float] | None:
+    """West, south, east, north of a terrain in degrees; None for one without an edge."""
+    middle = terrain.middle_deg
+    if middle is None:
+        return None
+    frame, box = Frame(*middle), (-MIDDLE_BOX_M, -MIDDLE_BOX_M, MIDDLE_BOX_M, MIDDLE_BOX_M)
+    west, south, east, north = terrain.around(frame, box).extent(frame, box)
+    corners = np.clip([[west, south], [west, north], [east, south], [east, north]], -FARTHEST_M, FARTHEST_M)
+    degrees = frame.to_degrees(corners[:, 0], corners[:, 1])
+    return [float(degrees[:, 1].min()), float(degrees[:, 0].min()), float(degrees[:, 1].max()),
+            float(degrees[:, 0].max())]  # fmt: skip
+
+
 class GroundTiles:
     """The tiles of the terrain that ``section`` names (``terrain:`` of a mission in ``folder``).
 
@@ -75,19 +88,7 @@ class GroundTiles:
         self._lock = threading.Lock()
         self._tiles: OrderedDict[TileNumber, bytes | None] = OrderedDict()
         self._blocks: OrderedDict[TileNumber, tuple[Frame, Surface, float]] = OrderedDict()
-        self.bounds = self._bounds()
-
-    def _bounds(self) -> list[float] | None:
-        """West, south, east, north in degrees; None for terrain without an edge."""
-        middle = self.terrain.middle_deg
-        if middle is None:
-            return None
-        frame, box = Frame(*middle), (-MIDDLE_BOX_M, -MIDDLE_BOX_M, MIDDLE_BOX_M, MIDDLE_BOX_M)
-        west, south, east, north = self.terrain.around(frame, box).extent(frame, box)
-        corners = np.clip([[west, south], [west, north], [east, south], [east, north]], -FARTHEST_M, FARTHEST_M)
-        degrees = frame.to_degrees(corners[:, 0], corners[:, 1])
-        return [float(degrees[:, 1].min()), float(degrees[:, 0].min()), float(degrees[:, 1].max()),
-                float(degrees[:, 0].max())]  # fmt: skip
+        self.bounds = bounds_of(self.terrain)
 
     def png(self, z: int, x: int, y: int) -> bytes | None:
         """The tile as PNG; None where there is no ground, or more than one tile may take."""

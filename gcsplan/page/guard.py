@@ -21,6 +21,9 @@ TOKEN_BYTES = 24
 
 REFUSALS = {403: b"forbidden\n", 404: b"not found\n", 405: b"method not allowed\n", 429: b"too many requests\n"}
 
+DROPPED = "dropped/"
+"""Below the token, where the page puts a file; only a request that says its origin may."""
+
 GOOD_SITES = (b"same-origin", b"none")
 """Values of Sec-Fetch-Site of the page's own requests, and of a user who opens it."""
 
@@ -100,7 +103,8 @@ class Guard:
         if not secrets.compare_digest(token.encode("utf-8", "replace"), self.token.encode()):
             return 404
         if scope["type"] == "http" and scope["method"] not in ("GET", "HEAD"):
-            return 405
+            dropped = scope["path"].removeprefix("/").partition("/")[2].startswith(DROPPED)
+            return 0 if own and scope["method"] == "PUT" and dropped else 405
         return 0
 
 

@@ -24,10 +24,12 @@ from gcsplan.mission_file.kept import KeptWorld
 from gcsplan.mission_file.load import MOST_VEHICLES_OF_FILE, zones_by_entry
 from gcsplan.mission_file.request import Content
 from gcsplan.page import answers
+from gcsplan.page.drop import DroppedFile
+from gcsplan.page.dropped.shelf import Shelf, endings
 from gcsplan.page.edits import Edits, terrain_choices
 from gcsplan.page.fleet.crew_changes import arrival_of
 from gcsplan.page.fleet.scene import scene_answer
-from gcsplan.page.form import form_of
+from gcsplan.page.form import changes_of, section_form, short_form
 from gcsplan.page.ground_tiles import LEAST_ZOOM, MOST_ZOOM, GroundTiles, contour_interval_m
 from gcsplan.page.history import EditedDocument
 from gcsplan.page.places import read_text, vehicles_of
@@ -53,6 +55,10 @@ _PLACE_OF = re.compile(r"vehicles\[(\d+)\]\.(?:start|goal|via)$")
 
 SPARE_DEG = 0.01
 """Degrees around a mission where the map opens."""
+
+
+ANSWERED_BY = {"place": "place", "section": "section", "text": "text", "inspect": "dropped"}
+"""Messages that change nothing, each with the type of its answer."""
 
 
 class StepTaker(Protocol):
@@ -93,6 +99,8 @@ class MapSession:
     def __init__(self, edits: Edits, units: Units, steps: StepsMaker, base: PageMessage | None = None) -> None:
         self._edits, self._units, self._base = edits, units, base
         self._send: SendAnswer = lambda answer: None
+        self.shelf = Shelf()
+        self._dropped = DroppedFile(edits, self.shelf)
         self._waiting: queue.SimpleQueue[PageMessage | None] = queue.SimpleQueue()
         self._held: PageMessage | None = None
         self._count = 0
@@ -225,13 +233,10 @@ class MapSession:
         edits, kind = self._edits, message["type"]
         if kind == "change":
             live = _is_live(message)
-            edits.change(message.get("changes"), live=live)
+            edits.change(changes_of(message), live=live)
             if live:
                 return True
             self._unkept = True
-        elif kind == "place":
-            self._send({"type": "place", "n": self._n, "at": read_text(message.get("text"))})
-            return False
         elif kind == "save":
             file = edits.save(message.get("name"), over=message.get("over") is True)
             self._disk = edits.store.disk()
@@ -239,6 +244,21 @@ class MapSession:
             self._send({"type": "saved", "n": self._n, "file": file.name})
             self._send_state()
             return False
+        elif kind in ANSWERED_BY:
+            self._send({"type": ANSWERED_BY[kind], "n": self._n, **self._answer_to(message)})
+            return False
+        elif kind == "set_text":
+            try:
+                edits.write(message.get("text"))
+            except InputError as why:
+                code = why.code if isinstance(why, PageError) else "bad_text"
+                self._send(answers.error_answer(self._n, why, code))
+                return False
+            self._unkept = True
+        elif kind == "take":
+            self._dropped.take(message)
+            self._zones, self._tiles_of = KeptWorld(), None  # a file may have been replaced
+            self._unkept = True
         elif kind == "units":
             if message.get("units") not in SYSTEMS:
                 raise PageError(f"units are {', '.join(SYSTEMS)}", code="bad_message", where="units")
@@ -270,6 +290,18 @@ class MapSession:
         self._problems = ()
         self._send_state()
         return True
+
+    def _answer_to(self, message: PageMessage) -> PageMessage:
+        """The answer to a message that changes nothing: a form, the text, the dropped file. Raises PageError."""
+        match message["type"]:
+            case "section":
+                return section_form(message.get("section"), self._edits.document, self._problems)
+            case "place":
+                return {"at": read_text(message.get("text"))}
+            case "text":
+                return {"text": self._edits.text}
+        with cancelled_by(lambda: self._superseded):
+            return self._dropped.look(message, self._units)
 
     def _look_around(self) -> None:
         """While nothing else happens: keep unsaved edits, and look whether the file changed."""
@@ -405,13 +437,13 @@ class MapSession:
             "type": "state", "n": self._n, "stage": edits.stage, "name": str(document.get("name", "")),
             "file": None if file is None else file.name, "saved": edits.is_saved, "disk": self._disk,
             "restored": edits.restored, "undo": edits.can_undo, "redo": edits.can_redo,
-            "files": terrain_choices(edits.store.folder), "base": self._base,
+            "files": terrain_choices(edits.store.folder), "drops": endings(), "base": self._base,
             "units": {"name": self._units.name, "systems": list(SYSTEMS), "kinds": self._units.as_dict()},
             "bounds": _bounds_of(vehicles) or (self._tiles.bounds if self._tiles is not None else None),
             "terrain": self._terrain(), "vehicles": vehicles, "vehicle": self._vehicle, "arrival": arrival_of(document),
             "zones": zones_geojson(document, entries, frame, self._units),
             "counts": {key: len(document.get(key) or ()) for key in ("no_fly", "keep_in")},
-            "form": form_of(document, self._problems, self._vehicle) if edits.stage == "mission" else [],
+            "form": short_form(document, self._problems, self._vehicle) if edits.stage == "mission" else [],
             "problems": [{"where": p.key, "message": p.message} for p in self._problems],
         }  # fmt: skip
 

@@ -7,8 +7,8 @@ from typing import Literal
 from gcsplan.errors import InputError
 
 PageCode = Literal[
-    "bad_message", "bad_change", "bad_mission", "changed_on_disk", "exists", "not_saved", "taken_over", "internal",
-    "not_sent"
+    "bad_message", "bad_change", "bad_mission", "bad_file", "bad_text", "changed_on_disk", "exists", "file_exists",
+    "not_saved", "taken_over", "internal", "not_sent"
 ]  # fmt: skip
 
 

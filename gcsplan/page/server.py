@@ -24,7 +24,7 @@ from gcsplan.page.refused import PageError, not_installed
 try:
     import uvicorn
     from starlette.applications import Starlette
-    from starlette.requests import Request
+    from starlette.requests import ClientDisconnect, Request
     from starlette.responses import FileResponse, Response
     from starlette.routing import Route, WebSocketRoute
     from starlette.websockets import WebSocket, WebSocketDisconnect
@@ -136,6 +136,7 @@ class MapServer:
                 Route("/report.html", self._report),
                 Route("/base/{z:int}/{x:int}/{y:int}", self._base_tile),
                 WebSocketRoute("/socket", self._talk),
+                Route("/dropped/{name}", self._drop, methods=["PUT"]),
                 Route("/{path:path}", self._file),
             ]
         )
@@ -167,6 +168,20 @@ class MapServer:
         place = (int(request.path_params[key]) for key in ("z", "x", "y"))
         found = None if self._base is None else await asyncio.to_thread(self._base.tile, *place)
         return _tile(found, "" if self._base is None else self._base.media_type)
+
+    async def _drop(self, request: Request) -> Response:
+        """Take the bytes of a dropped file, no more than one of its kind may have; nothing of it is read here."""
+        size = request.headers.get("content-length", "")
+        try:
+            coming = self._session.shelf.receive(request.path_params["name"], int(size) if size.isdigit() else None)
+            async for part in request.stream():
+                coming.add(part)
+            held = self._session.shelf.put(coming)
+        except InputError as why:
+            return Response(_json({"error": str(why)}), media_type="application/json")
+        except ClientDisconnect:
+            return Response(status_code=400)
+        return Response(_json({"name": held.name, "kind": held.kind}), media_type="application/json")
 
     async def _talk(self, page: WebSocket) -> None:
         """Take the messages of the page; one page at a time counts, the newest."""

@@ -115,7 +115,7 @@ class MissionStore:
     def keep(self, document: EditedDocument) -> None:
         """Keep unsaved edits beside the mission. Raises InputError."""
         self._kept = True
-        kept = {"of_sha256": self._sha256, "mission": document, "text": self.text if self.file is None else None}
+        kept = {"of_sha256": self._sha256, "mission": document, "text": self.text}
         write_whole(self.edits, json.dumps(kept, default=_plain))
 
     def forget(self) -> None:
@@ -128,8 +128,8 @@ class MissionStore:
     def kept(self) -> EditedDocument | None:
         """The unsaved edits of an earlier run; None if there are none that can be read.
 
-        If they belong to another state of the file, the file counts as changed on the disk. Without a file, ``text`` is
-        then that of the earlier run.
+        If they belong to another state of the file, the file counts as changed on the disk. Otherwise ``text`` is then
+        that of the earlier run.
         """
         try:
             with self.edits.open("rb") as opened:
@@ -139,11 +139,13 @@ class MissionStore:
         except (OSError, ValueError, KeyError, TypeError, RecursionError, GcsplanError):
             return None
         self._kept = True
+        text, same = found.get("text"), found["of_sha256"] == self._sha256  # type: ignore[union-attr,index]
         if self.file is None:
-            text = found.get("text")  # type: ignore[union-attr]
             self.text = text if isinstance(text, str) else None
-        elif found["of_sha256"] != self._sha256:  # type: ignore[index]
+        elif not same:
             self._changed = "changed"
+        elif isinstance(text, str):
+            self.text = text
         return document
 
     def _named(self, name: str | None) -> Path:

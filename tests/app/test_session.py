@@ -24,6 +24,7 @@ from gcsplan.app.plan.model import Plan
 from gcsplan.app.session import BetterPath, Planner
 from gcsplan.cli.command_table import app
 from gcsplan.errors import Cancelled, GcsplanError, InputError, UsageError
+from gcsplan.world.geometry.zones import Circle
 from tests.export.test_output_schema import FLAT
 from tests.mission_file.test_memory_files import FEATURE, TERRAIN
 from tests.support.batches import mission
@@ -360,5 +361,8 @@ def test_a_session_plans_over_what_it_read_until_it_reloads(tmp_path: Path) -> N
     zone.write_text(json.dumps({**FEATURE, "geometry": {"type": "Point", "coordinates": [-84.31, 36.51]},
                                 "properties": {"radius_m": 20}}), encoding="utf-8")  # fmt: skip
     assert figures(session.plan()) == around
+    [before] = session.loaded().zones
     session.reload()
+    [after] = session.loaded().zones
+    assert (isinstance(before.shape, Circle), isinstance(after.shape, Circle)) == (False, True)
     assert figures(session.plan()) == figures(plan(load_mission(session.mission)))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from tests.support.browser import Browser
@@ -81,6 +82,13 @@ class Hand:
             self.mouse("mouseMoved", x, y, down=True)
             self.page.settle()
         self.mouse("mouseReleased", *places[-1])
+
+    def drop(self, file: Path, where: str = "#map-frame canvas") -> None:
+        """A file from elsewhere is dragged onto an element, and dropped."""
+        x, y = self.at(where)
+        data = {"items": [], "files": [str(file)], "dragOperationsMask": 1}
+        for kind in ("dragEnter", "dragOver", "drop"):
+            self.page.ask("Input.dispatchDragEvent", type=kind, x=x, y=y, data=data)
 
     def key(self, name: str, *, control: bool = False) -> None:
         """A key down and up."""

@@ -12,7 +12,7 @@ import pytest
 from gcsplan.mission_file.kept import KeptWorld
 from gcsplan.mission_file.load import zones_by_entry
 from gcsplan.mission_file.request import Content
-from gcsplan.page.form import cure_changes, form_of, require_changes
+from gcsplan.page.form import cure_changes, require_changes, short_form
 from gcsplan.page.history import MOST_STEPS, EditHistory
 from gcsplan.page.places import place_of, read_text, vehicles_of, with_heights
 from gcsplan.page.refused import PageError
@@ -41,7 +41,8 @@ def test_steps_are_taken_back_in_order_and_bounded() -> None:
     "place",
     ["vehicles[0].goal", "vehicles[12].via", "vehicles[1].max_agl_m", "vehicles[1].limits.max_agl_ft", "no_fly[3]",
      "limits.max_agl_ft", "no_fly[3].radius_m", "keep_in[0].ceiling_amsl_m", "planner.objective",
-     "terrain.obstacle_height_m"],
+     "terrain.obstacle_height_m", "name", "planner.name", "at", "frame.origin", "wind.up_to_kt", "no_fly[0].on_bad",
+     "vehicles[0].energy.battery_wh", "vehicles[0].energy", "wind"],
 )  # fmt: skip
 def test_the_page_changes_places_zones_and_the_form(place: str) -> None:
     assert require_changes({place: None}) == {place: None}
@@ -49,8 +50,9 @@ def test_the_page_changes_places_zones_and_the_form(place: str) -> None:
 
 @pytest.mark.parametrize(
     "place",
-    ["terrain.dem", "terrain.canopy", "no_fly[0].file", "vehicles[0].link", "vehicles[0]", "name", "", "no_fly",
-     "vehicles[0].name.x", "limits", "vehicles.uav1.goal", "planner.name", "vehicles[0].energy", "at", "frame.origin"],
+    ["terrain.dem", "terrain.canopy", "terrain.geoid_grid", "wind.forecast", "no_fly[0].file", "vehicles[0].link",
+     "vehicles[0]", "", "no_fly", "vehicles[0].name.x", "limits", "vehicles.uav1.goal", "vehicles[0].energy", "version",
+     "terrain", "planner.parameters.x", "vehicles", "arrival"],
 )  # fmt: skip
 def test_the_page_changes_nothing_else(place: str) -> None:
     with pytest.raises(PageError):
@@ -65,7 +67,7 @@ def test_a_cure_is_set_where_the_mission_has_the_limit() -> None:
 
 
 def test_a_form_has_what_the_reference_says_of_each_key() -> None:
-    fields = {field["key"]: field for field in form_of({"limits": {"min_agl_m": 30}}, [])}
+    fields = {field["key"]: field for field in short_form({"limits": {"min_agl_m": 30}}, [])}
     assert fields["limits.min_agl_m"]["value"] == 30
     assert fields["vehicles[0].end"]["choices"] == ["land", "loiter", "rtl", "none"]
     assert all(field["help"] and field["label"] for field in fields.values())

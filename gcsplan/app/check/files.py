@@ -60,17 +60,23 @@ def check_files(source: MissionFile, arguments: Sequence[str], *, returns: Retur
     return list(batch.checked)
 
 
-def check_batch(source: MissionFile, arguments: Sequence[str], *, returns: Returns = NO_RETURNS) -> Batch:
+def check_batch(
+    source: MissionFile,
+    arguments: Sequence[str],
+    *,
+    returns: Returns = NO_RETURNS,
+    held: Mapping[str, bytes] | None = None,
+) -> Batch:
     """Judge each FILE or NAME=FILE in the world of ``source``; a file that cannot be read does not stop the others.
 
     ``returns``: whether the way home is judged, beside the mission file's own ``way_home``. If a file reaches beyond
-    the terrain that was loaded for the mission, more terrain is loaded. Raises UsageError if it is not clear which
-    vehicle a file is for.
+    the terrain that was loaded for the mission, more terrain is loaded. ``held``: the content of files that lie on no
+    disk, by their names. Raises UsageError if it is not clear which vehicle a file is for.
     """
     for argument in arguments:
         match(source, argument)
     both = replace(returns, required=is_required(source, returns.required))
-    return check_at(MissionSite(source), source.name, arguments, VerdictParts(both))
+    return check_at(MissionSite(source, held), source.name, arguments, VerdictParts(both))
 
 
 def in_other_winds(source: MissionFile, wind: Mapping[str, object]) -> MissionFile:

@@ -130,10 +130,14 @@ class CheckSite(Protocol):
 
 
 class MissionSite:
-    """The world of a mission file. Its vehicles start where the file says."""
+    """The world of a mission file. Its vehicles start where the file says.
 
-    def __init__(self, source: MissionFile) -> None:
+    ``held``: the content of files that lie on no disk, by their names.
+    """
+
+    def __init__(self, source: MissionFile, held: Mapping[str, bytes] | None = None) -> None:
         self.source = source
+        self._held = held or {}
         self.typed: Mapping[str, str] = {}
         self._world: World | None = None
 
@@ -141,9 +145,8 @@ class MissionSite:
         """See `CheckSite.read`. Raises UsageError too, if it is not clear which vehicle the file is for."""
         request, file = match(self.source, argument)
         start = Home.at(*request.start_deg, request.start[2])
-        return at_start(
-            read_mission_file(file, autopilot=request.vehicle.autopilot, home_hint=start), start, request.vehicle
-        )
+        pilot, data = request.vehicle.autopilot, self._held.get(str(file))
+        return at_start(read_mission_file(file, autopilot=pilot, home_hint=start, data=data), start, request.vehicle)
 
     def settle(self, places: Floats, reach_m: float, *, several: bool) -> None:
         """See `CheckSite.settle`: more terrain is loaded if the files reach beyond the mission's terrain."""

@@ -34,16 +34,18 @@ def read_mission_file(
     autopilot: Autopilot | None,
     home_hint: Home | None = None,
     otherwise: Autopilot | None = None,
+    data: bytes | None = None,
 ) -> MissionFileRead:
     """Read a `.waypoints` or `.plan` file; its content decides which it is. The mission is named after the file.
 
     ``autopilot`` None means the one that a `.plan` names. A `.waypoints` file names none: there, ``autopilot`` None
-    means ``otherwise``, and the notes say so. ``home_hint`` is the home for a file that has none. Raises InputError
-    for every mistake, with line or key.
+    means ``otherwise``, and the notes say so. ``home_hint`` is the home for a file that has none. ``data``: the content
+    of a file that lies on no disk; ``path`` is then its name in messages. Raises InputError for every mistake, with
+    line or key.
     """
     file = Path(path)
     where = str(path)
-    text = _text(file, where)
+    text = _text(file, where, data)
     start = text.lstrip("\ufeff \t\r\n")[:40]
     if start.startswith("{"):
         read = parse_plan(text, autopilot=autopilot, where=where, home_hint=home_hint)
@@ -72,11 +74,12 @@ def _instead(file: Path) -> str:
     return f"; terrain is given with --dem {name}, or in a mission file" if end in TERRAIN_FILES else ""
 
 
-def _text(file: Path, where: str) -> str:
+def _text(file: Path, where: str, data: bytes | None) -> str:
     try:
-        regular = stat.S_ISREG(file.stat().st_mode)
-        with open(file if regular else os.devnull, "rb") as stream:
-            data = stream.read(MAX_FILE_BYTES + 1)
+        regular = data is not None or stat.S_ISREG(file.stat().st_mode)
+        if data is None:
+            with open(file if regular else os.devnull, "rb") as stream:
+                data = stream.read(MAX_FILE_BYTES + 1)
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror or error}", where=where) from None
     except ValueError:

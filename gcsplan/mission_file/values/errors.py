@@ -65,7 +65,10 @@ def with_lines(problems: Sequence[Mistake], text: str, where: str) -> list[Mista
     """The problems with their lines in a mission's ``text``, whose keys begin with ``where``; others unchanged."""
     lines = lines_of(text, [p.where.removeprefix(where) if p.where.startswith(where) else "" for p in problems])
     ends = ["" if n is None else f" (line {n})" for n in lines]
-    return [replace(p, message=p.message + end, line=end) for p, end in zip(problems, ends, strict=True)]
+    return [
+        replace(p, message=p.message + end, line=end, in_line=n)
+        for p, end, n in zip(problems, ends, lines, strict=True)
+    ]
 
 
 def few(problems: Sequence[Mistake], where: str, most: int, count: int | None = None) -> list[Mistake]:

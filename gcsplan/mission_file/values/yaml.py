@@ -15,7 +15,7 @@ from typing import Any
 
 import yaml
 
-from gcsplan.errors import InputError
+from gcsplan.errors import InputError, Mistake
 from gcsplan.mission_file.values.places import PLACE_EXAMPLES
 
 MAX_YAML_BYTES = 5_000_000
@@ -72,10 +72,10 @@ def read_yaml(text: str, *, where: str) -> Any:
             context += f" (begun in line {why.context_mark.line + 1})"
         problem = " ".join(x for x in (context, why.problem) if x)
         if "nesting depth" in problem:  # since PyYAML 6.0.4 its scanner, which reads ahead, has a limit of its own
-            raise InputError(_TOO_DEEP, where=_place(where, mark)) from None
+            raise _wrong(_TOO_DEEP, where, mark) from None
         begun = None if why.context_mark is None else why.context_mark.line
         hint = "" if mark is None else cure(text, mark.line, begun)
-        raise InputError(f"this is not YAML: {problem}{hint}", where=_place(where, mark)) from None
+        raise _wrong(f"this is not YAML: {problem}{hint}", where, mark) from None
     except (yaml.YAMLError, UnicodeError) as why:
         raise InputError(f"this is not YAML: {str(why).splitlines()[0][:200]}", where=where) from None
 
@@ -120,10 +120,10 @@ def _measure(text: str, where: str) -> None:
         elif isinstance(event, yaml.CollectionEndEvent):
             depth -= 1
         if depth > MAX_YAML_DEPTH:
-            raise InputError(_TOO_DEEP, where=_place(where, event.start_mark))
+            raise _wrong(_TOO_DEEP, where, event.start_mark)
         for what, count, most in (("aliases", aliases, MAX_ALIASES), ("values", nodes, MAX_YAML_NODES)):
             if count > most:
-                raise InputError(f"the file has more than {most} {what}", where=_place(where, event.start_mark))
+                raise _wrong(f"the file has more than {most} {what}", where, event.start_mark)
 
 
 def _count(node: yaml.Node, sizes: dict[int, int], where: str) -> int:
@@ -133,7 +133,7 @@ def _count(node: yaml.Node, sizes: dict[int, int], where: str) -> int:
     known = sizes.get(id(node))
     if known is not None:
         if known < 0:
-            raise InputError("an alias holds itself", where=_place(where, node.start_mark))
+            raise _wrong("an alias holds itself", where, node.start_mark)
         return known
     sizes[id(node)] = -1
     children = node.value if isinstance(node, yaml.SequenceNode) else [x for pair in node.value for x in pair]
@@ -166,21 +166,19 @@ def _mapping(node: yaml.MappingNode, where: str) -> dict[str, Any]:
                 if number
                 else ""
             )
-            raise InputError(
-                f"a key must be a word, given {_shown(key_node)}{hint}", where=_place(where, key_node.start_mark)
-            )
+            raise _wrong(f"a key must be a word, given {_shown(key_node)}{hint}", where, key_node.start_mark)
         if key == "<<" and key_node.tag == _PLAIN_STYLE:
             for part in value_node.value if isinstance(value_node, yaml.SequenceNode) else [value_node]:
                 if not isinstance(part, yaml.MappingNode):
-                    raise InputError("`<<` merges mappings only", where=_place(where, part.start_mark))
+                    raise _wrong("`<<` merges mappings only", where, part.start_mark)
                 for k, v in _mapping(part, where).items():
                     merged.setdefault(k, v)
             continue
         if key in found:
-            raise InputError(f"the key `{key}` stands twice; keep one", where=_place(where, key_node.start_mark))
+            raise _wrong(f"the key `{key}` stands twice; keep one", where, key_node.start_mark)
         tight = missing_space(key) if value_node.tag == _PLAIN_STYLE and not value_node.value else ""
         if tight:  # `{sysid:1}` is a mapping with the key `sysid:1`
-            raise InputError(tight, where=_place(where, key_node.start_mark))
+            raise _wrong(tight, where, key_node.start_mark)
         found[key] = _value(value_node, where)
     return merged | found
 
@@ -196,7 +194,7 @@ def _scalar(node: yaml.Node, where: str) -> Any:
         return text[0] in "tT"
     if _INT.match(text):
         if len(text) > 4000:  # Python's int() has a limit slightly above
-            raise InputError(f"a number of {len(text)} digits", where=_place(where, node.start_mark))
+            raise _wrong(f"a number of {len(text)} digits", where, node.start_mark)
         base = {"0o": 8, "0x": 16}.get(text[:2], 10)
         return int(text, base)
     if _YAML_FLOAT.match(text):
@@ -214,12 +212,15 @@ def number_or_text(text: str) -> float | str:
 
 def _require_tag(node: yaml.Node, kind: str, where: str) -> None:
     if node.tag not in (_TAG + kind, "!"):
-        raise InputError(f"the tag {node.tag[:80]!r} is not allowed here; write the plain value",
-                         where=_place(where, node.start_mark))  # fmt: skip
+        raise _wrong(f"the tag {node.tag[:80]!r} is not allowed here; write the plain value", where, node.start_mark)
 
 
-def _place(where: str, mark: Any) -> str:
-    return where if mark is None else f"{where}: line {mark.line + 1}, column {mark.column + 1}"
+def _wrong(message: str, where: str, mark: Any) -> InputError:
+    """The mistake at a mark of the text; None: somewhere in it."""
+    if mark is None:
+        return InputError(message, where=where)
+    at = f"{where}: line {mark.line + 1}, column {mark.column + 1}"
+    return InputError(message, where=at, problems=[Mistake(at, message, in_line=mark.line + 1)])
 
 
 def _shown(node: yaml.Node) -> str:

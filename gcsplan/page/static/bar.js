@@ -26,7 +26,7 @@ export function startBar() {
 function shortcut(event) {
   if (!(event.ctrlKey || event.metaKey) || event.altKey || event.target.closest('dialog')) return;
   const key = event.key.toLowerCase();
-  if (key !== 's' && event.target.closest('input')) return; // a field undoes its own typing
+  if (key !== 's' && event.target.closest('input, textarea')) return; // a field undoes its own typing
   const target = { z: event.shiftKey ? 'redo' : 'undo', y: 'redo', s: 'save' }[key];
   if (!target) return;
   event.preventDefault();
@@ -54,7 +54,7 @@ function state(now) {
 
 function error(message) {
   if (message.code === 'exists' || message.code === 'changed_on_disk') { decide(message); return; }
-  if (message.code === 'bad_mission' || message.where === 'place') return; // beside their fields
+  if (['bad_mission', 'bad_text', 'file_exists'].includes(message.code) || message.where === 'place') return; // beside their fields
   if (message.code === 'taken_over') return;
   banner('error', message.where ? `${message.where}: ${message.message}` : message.message, [], 'bad', 12000);
 }

@@ -1,7 +1,7 @@
 // The newest messages of the server, and who listens to them.
 const listeners = new Map();
 
-export const known = { state: null, plan: null, n: 0, busy: false };
+export const known = { state: null, plan: null, n: 0, busy: false, datums: {} };
 
 export function on(kind, call) {
   listeners.set(kind, [...(listeners.get(kind) || []), call]);

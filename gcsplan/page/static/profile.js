@@ -1,5 +1,5 @@
 // The profile along the path: ground, limits, path. A pointer here marks the place on the map, and one there marks it here.
-import { byId, degrees, el, refill, svg } from './dom.js';
+import { button, byId, degrees, el, refill, svg } from './dom.js';
 import { known, on, tell, worded } from './hub.js';
 import { choose, toneOf } from './fleet.js';
 import { canvas, frame, pixel } from './map.js';
@@ -11,6 +11,7 @@ let shown = null, vehicle = -1, at = -1, flown = [], plot = null, cursor = null,
 
 export function startProfile() {
   on('judged', draw);
+  on('file profile', draw); // a dropped file's, or the mission's again
   on('state', (state) => {
     if (state.stage !== 'mission' || !byId('below').children.length) draw(null);
     byId('below').hidden = state.stage === 'empty';
@@ -39,7 +40,7 @@ function draw(plan) {
   shown = one.profile;
   const choice = flights.length > 1 ? el('select', { id: 'profile-of', 'aria-label': 'Profile of', onchange: (event) => choose(Number(event.target.value)) },
     ...flights.map((v) => el('option', { value: v.vehicle, selected: v === one }, v.name))) : null;
-  refill(box, choice, chart(shown, toneOf(one.vehicle)));
+  refill(box, choice, chart(shown, one.vehicle < 0 ? 't3' : toneOf(one.vehicle), one.marks || []));
   own = one.vehicle;
   showFlown();
 }
@@ -77,7 +78,7 @@ function band(xs, low, high) {
   return text;
 }
 
-function chart(p, tone) {
+function chart(p, tone, marks) {
   const end = p.distance_m[p.distance_m.length - 1] || 1, heights = [...p.ground_m, ...p.path_m, ...p.lowest_m].filter((v) => v !== null);
   const low = Math.min(...heights), high = Math.max(...heights, ...near(p, heights)), room = 0.06 * (high - low) || 10;
   range = { end, y0: low - room, y1: high + room };
@@ -106,8 +107,15 @@ function chart(p, tone) {
     class: 'view plot', tabindex: 0, role: 'slider', 'aria-label': 'Place along the path', 'aria-valuemin': 0, 'aria-valuemax': Math.round(end), 'aria-valuenow': 0,
     onpointermove: overPlot, onpointerdown: overPlot, onpointerleave: () => point(-1), onkeydown: key, onblur: () => point(-1),
   }, svg('svg', { viewBox: `0 0 ${ALL} ${ALL}`, preserveAspectRatio: 'none', 'aria-hidden': 'true' }, grids, ...shapes, cursor));
-  return el('figure', { class: 'chart' }, el('div', { class: 'ylabel' }, height[0]), yticks, plot, xticks,
+  return el('figure', { class: 'chart' }, el('div', { class: 'ylabel' }, height[0]), yticks, el('div', { class: 'along' }, ...marks.map((mark) => spot(mark, end))), plot, xticks,
     el('div', { class: 'foot' }, legend(p, tone), el('span', { class: 'xlabel' }, `along the path, ${far[0]}`)));
+}
+
+// A place along the path that the user can go to.
+function spot(mark, end) {
+  const made = button(String(mark.item), mark.go, { class: 'finding', 'aria-label': `Item ${mark.item}: ${mark.words}`, title: mark.words });
+  made.style.left = `${(100 * mark.at_m) / end}%`;
+  return made;
 }
 
 // The highest allowed, as far as it belongs in the picture.

@@ -23,7 +23,7 @@ export function startResult() {
   on('dragged', (changes) => { if (current) { agePath(moved(changes)); follows(); } });
   on('error', (message) => {
     if (message.code === 'bad_mission') nothing(message.message, 'The mission has a mistake');
-    if (message.code === 'bad_change') for (const answer of before) ({ plan, home, refused })[answer.type](answer);
+    if (['bad_change', 'bad_file', 'bad_text', 'file_exists'].includes(message.code)) for (const answer of before) ({ plan, home, refused })[answer.type](answer);
   });
   on('connection', (now) => { if (now !== 'open') nothing('The result below may be old.', 'Not connected'); });
   on('state', (state) => { for (const one of box.querySelectorAll('#rest > [data-vehicle]')) one.open = Number(one.dataset.vehicle) === state.vehicle; });

@@ -1,6 +1,7 @@
 // Start from nothing: the ground, the vehicle and the legal ceiling are chosen; then start and goal are clicked.
 import { button, byId, el, refill } from './dom.js';
-import { on } from './hub.js';
+import { numberOf } from './fields.js';
+import { known, on } from './hub.js';
 import { send, step } from './link.js';
 import { canvas, goTo } from './map.js';
 import { enter } from './modes.js';
@@ -15,6 +16,7 @@ export function startFromNothing(panel) {
   on('state', (state) => {
     if (state.stage === 'empty' && (!form || symbol !== state.units.kinds.height[0])) show(panel, state);
     if (state.stage !== 'empty') form = null;
+    if (form && byId('start-file')) offer(byId('start-file'), state.files);
     if (state.stage === 'draft' && draft !== state.name) { draft = state.name; begin(state); }
     if (state.stage === 'mission') draft = null;
   });
@@ -23,6 +25,13 @@ export function startFromNothing(panel) {
     if (!form || (message.n !== asking && message.where !== 'place')) return;
     complain('start-place', message.message);
   });
+}
+
+// The files of the folder, of which a dropped one may be new.
+function offer(choice, files) {
+  const before = choice.value;
+  choice.replaceChildren(...files.map((f) => el('option', {}, f)));
+  choice.value = files.includes(before) ? before : files[0];
 }
 
 function begin(state) {
@@ -61,7 +70,7 @@ function show(panel, state) {
   form.querySelector('[value=copter]').checked = true;
 }
 
-const number = (id, value, label, group, choice) => el('input', { id, type: 'number', value, step: 'any', inputmode: 'decimal', 'aria-label': label, oninput: () => pick(group, choice), onfocus: () => pick(group, choice) });
+const number = (id, value, label, group, choice) => el('input', { id, type: 'text', class: 'number', value, inputmode: 'decimal', 'aria-label': label, oninput: () => pick(group, choice), onfocus: () => pick(group, choice) });
 const problem = (name) => el('p', { class: 'problem', id: `${name}-problem`, role: 'alert', hidden: true });
 const pick = (group, value) => { form.querySelector(`[name=${group}][value=${value}]`).checked = true; };
 
@@ -88,15 +97,17 @@ function found(at) {
   complain('start-place', '');
 }
 
+const onFile = (dem) => ({ dem, ...(known.datums[dem] ? { vertical_datum: known.datums[dem] } : {}) });
+const inMetres = (id) => Number(((numberOf(byId(id).value).value ?? NaN) * unit_m).toPrecision(12));
+
 function submit(event) {
   event.preventDefault();
   const chosen = (name) => (form.querySelector(`[name=${name}]:checked`) || {}).value;
-  const ground = chosen('ground'), ceiling = chosen('ceiling'), metres = Number((Number(byId('start-ceiling').value) * unit_m).toPrecision(12));
-  const height = byId('start-flat').value;
-  complain('ground', !ground ? 'Choose the ground: it is never assumed.' : ground === 'flat' && height === '' ? 'Give the height of the flat ground.' : '');
+  const ground = chosen('ground'), ceiling = chosen('ceiling'), metres = inMetres('start-ceiling'), height = inMetres('start-flat');
+  complain('ground', !ground ? 'Choose the ground: it is never assumed.' : ground === 'flat' && Number.isNaN(height) ? 'Give the height of the flat ground.' : '');
   complain('ceiling', !ceiling ? 'Choose: the law of the place decides.' : ceiling === 'metres' && !(metres > 0) ? 'Give a height above 0.' : '');
   const wrong = form.querySelector('.problem:not([hidden])');
   if (wrong) { const field = wrong.closest('fieldset, details').querySelector('input'); field.focus(); return; }
-  const terrain = { sample: { dem: 'sample:jacksboro' }, flat: { flat_m: Number((Number(height) * unit_m).toPrecision(12)) }, file: { dem: (byId('start-file') || {}).value } }[ground];
+  const terrain = { sample: { dem: 'sample:jacksboro' }, flat: { flat_m: height }, file: onFile((byId('start-file') || {}).value) }[ground];
   step({ type: 'new', terrain, preset: chosen('preset'), max_agl_m: ceiling === 'none' ? null : metres, min_agl_m: Math.min(60, ceiling === 'none' ? 60 : metres / 2), start: null, goal: null });
 }

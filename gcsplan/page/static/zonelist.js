@@ -1,5 +1,6 @@
 // The zones as a list, and the chosen one's name, size, floor and ceiling as fields.
 import { button, el, refill } from './dom.js';
+import { numberOf } from './fields.js';
 import { known, on } from './hub.js';
 import { change } from './link.js';
 import { goTo } from './map.js';
@@ -36,12 +37,20 @@ function show() {
     list.length ? el('ul', { class: 'list' }, ...items) : el('p', { class: 'note' }, 'None. Draw one with Circle or Polygon on the map.')));
 }
 
+// Whether a text is a number; if not, its field says why.
+function said(input, found) {
+  input.setCustomValidity(found.why || '');
+  input.setAttribute('aria-invalid', String(Boolean(found.why)));
+  if (found.why) input.reportValidity();
+  return !found.why;
+}
+
 function editor(z) {
   if (!z.editable) return null;
   const name = el('input', { id: 'zone-name', type: 'text', value: z.name, onchange: () => { if (name.value.trim()) change({ [`${z.key}.name`]: name.value.trim() }); } });
   const parts = [el('div', { class: 'row' }, el('label', { for: 'zone-name' }, 'Name'), name)];
   if (z.shape === 'circle') {
-    const radius = el('input', { id: 'zone-radius', type: 'number', min: 1, step: 'any', value: z.radius_m, onchange: () => change({ [`${z.key}.radius_m`]: Number(radius.value) }) });
+    const radius = el('input', { id: 'zone-radius', type: 'text', inputmode: 'decimal', class: 'number', value: z.radius_m, onchange: () => { const found = numberOf(radius.value); if (said(radius, found)) change({ [`${z.key}.radius_m`]: found.value }); } });
     parts.push(el('div', { class: 'row' }, el('label', { for: 'zone-radius' }, 'Radius, m'), radius));
   }
   parts.push(level(z, 'floor'), level(z, 'ceiling'));
@@ -54,15 +63,17 @@ function editor(z) {
 function level(z, which) {
   const [key, value] = Object.entries(z[which] || {})[0] || ['', ''], [, from, own] = key.split('_');
   const unit = own || known.state.units.kinds.height[0];
-  const input = el('input', { id: `zone-${which}`, type: 'number', step: 'any', value, 'aria-label': `${which}, number`, onchange: put });
+  const input = el('input', { id: `zone-${which}`, type: 'text', inputmode: 'decimal', class: 'number', value, 'aria-label': `${which}, number`, onchange: put });
   const kind = el('select', { id: `zone-${which}-from`, 'aria-label': `${which}, counted from`, onchange: put }, el('option', { value: '' }, 'none'),
     ...LEVELS.map(([v, words]) => el('option', { value: v, selected: v === from }, `${unit} ${words}`)));
   function put(event) {
     if (event.target === input && kind.value === '') kind.value = 'agl';
     if (kind.value !== '' && input.value === '') { input.focus(); return; }
+    const found = numberOf(input.value);
+    if (kind.value !== '' && !said(input, found)) return;
     const now = kind.value ? `${which}_${kind.value}_${unit}` : '', changes = {};
     if (key && key !== now) changes[`${z.key}.${key}`] = null;
-    if (now) changes[`${z.key}.${now}`] = Number(input.value);
+    if (now) changes[`${z.key}.${now}`] = found.value;
     if (Object.keys(changes).length) change(changes);
   }
   return el('div', { class: 'row' }, el('label', { for: `zone-${which}` }, which === 'floor' ? 'Floor' : 'Ceiling'), input, kind);

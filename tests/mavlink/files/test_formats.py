@@ -99,6 +99,8 @@ def test_a_waypoints_file_reads_back_as_the_same_mission(mission: Mission) -> No
     text = write_waypoints(mission)
     assert wire(read_waypoints(text, autopilot=mission.autopilot, where="f")) == wire(mission)
     assert write_waypoints(mission) == text
+    held = read_mission_file("no/such.waypoints", autopilot=mission.autopilot, data=text.encode())
+    assert wire(held.mission) == wire(mission)  # a file that lies on no disk
 
 
 @settings(max_examples=draws(80))

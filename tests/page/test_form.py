@@ -1,0 +1,97 @@
+"""The forms: a field for each key of the schema, or the reason why only the text of the mission has it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gcsplan.errors import InputError
+from gcsplan.mission_file.json_schema import mission_schema
+from gcsplan.mission_file.values.units import other_names
+from gcsplan.page.form import (
+    SECTIONS,
+    YAML_ONLY,
+    changes_of,
+    keys_of,
+    part_of,
+    require_own_files,
+    section_form,
+)
+from gcsplan.page.refused import PageError
+
+
+def parts_below(entry: Any) -> set[str]:
+    """The parts of the schema that an entry refers to."""
+    if isinstance(entry, dict):
+        own = {entry["$ref"].rpartition("/")[2]} if "$ref" in entry else set()
+        return own.union(*map(parts_below, entry.values()))
+    return set().union(*map(parts_below, entry)) if isinstance(entry, list) else set()
+
+
+def test_every_key_of_the_schema_has_a_field_or_a_reason_why_not() -> None:
+    whole = mission_schema()
+    parts = {"": whole, **whole["$defs"]}
+    typed: set[str] = set()  # parts that a field takes as one value, typed as in the file
+    missing = []
+    for part in set(SECTIONS.values()):
+        own = parts[part]["properties"]
+        fields = keys_of(part)
+        sections = {place.rpartition(".")[2].removesuffix("[]") for place in SECTIONS if place}
+        for key in own.keys() - other_names(own).keys():
+            if key in fields:
+                typed |= parts_below(own[key])
+            elif key not in sections:
+                missing.append((part, key))
+        typed |= {inner for one in typed for inner in parts_below(parts[one])}
+    assert missing == []
+    assert set(parts) - set(SECTIONS.values()) <= typed
+    for part, key in YAML_ONLY:
+        assert key in keys_of(part), "a reason for a key that is not there"
+
+
+@pytest.mark.parametrize("section", [s.replace("[]", "[0]") for s in SECTIONS])
+def test_a_field_says_unit_default_and_meaning_and_a_fixed_one_the_reason(section: str) -> None:
+    fields = section_form(section, {}, [])["fields"]
+    assert len({f["key"] for f in fields}) == len(fields) == len(keys_of(str(part_of(section))))
+    for field in fields:
+        assert field["help"]
+        assert (field["kind"] == "fixed") == bool(field["reason"])
+        assert field["kind"] in ("number", "text", "choice", "boolean", "yaml", "fixed")
+
+
+def test_values_stand_in_their_own_units_and_lists_as_in_the_file() -> None:
+    document = {"vehicles": [{"speed_kt": [5, 20], "climb_m_s": 3, "energy": {"battery_wh": 90}}]}
+    fields = {f["key"]: f for f in section_form("vehicles[0]", document, [])["fields"]}
+    assert (fields["vehicles[0].speed_kt"]["value"], fields["vehicles[0].speed_kt"]["unit"]) == ("[5, 20]", "kt")
+    assert (fields["vehicles[0].climb_m_s"]["value"], fields["vehicles[0].climb_m_s"]["quantity"]) == (3, "climb_rate")
+    energy = {f["key"]: f["value"] for f in section_form("vehicles[0].energy", document, [])["fields"]}
+    assert energy["vehicles[0].energy.battery_wh"] == 90
+
+
+@pytest.mark.parametrize("section", [None, 3, "vehicles", "vehicles[0].x", "__class__", "no_fly", "vehicles[0].via[0]"])
+def test_a_section_without_a_form_is_refused(section: object) -> None:
+    with pytest.raises(PageError):
+        section_form(section, {}, [])
+
+
+def test_a_value_is_typed_as_in_the_file_and_a_mistake_is_said_at_its_key() -> None:
+    typed = {"vehicles[0].speed_m_s": "[3, 12.5]", "at": "2026-12-01T10:00Z"}
+    assert changes_of({"changes": {"name": "x"}, "yaml": typed}) == {
+        "name": "x", "vehicles[0].speed_m_s": [3, 12.5], "at": "2026-12-01T10:00Z"
+    }  # fmt: skip
+    with pytest.raises(PageError) as why:
+        changes_of({"changes": {}, "yaml": {"wind.levels": "[{agl_m: 1"}})
+    assert why.value.where == "wind.levels"
+
+
+def test_a_text_names_no_file_outside_of_the_folder_but_those_it_had(tmp_path: Path) -> None:
+    before = {"terrain": {"dem": "/data/dem.tif"}, "no_fly": [{"file": "../shared/zones.kml"}]}
+    own = {"terrain": {"dem": ["/data/dem.tif", "sample:jacksboro", "here.tif"]}, "no_fly": [*before["no_fly"]]}
+    require_own_files(own, before, tmp_path, "")
+    wrong = {"terrain": {"dem": "/data/other.tif"}, "keep_in": [{"file": "a/../../b.kml"}], "wind": {"forecast": "w"}}
+    text = "terrain: {dem: /data/other.tif}\nkeep_in:\n  - {file: a/../../b.kml}\nwind: {forecast: w}\n"
+    with pytest.raises(InputError) as why:
+        require_own_files(wrong, before, tmp_path, text)
+    assert [(p.where, p.in_line) for p in why.value.problems] == [("terrain.dem", 1), ("keep_in[0].file", 3)]
