@@ -22,7 +22,7 @@ MOST_POINTS = 500
 """Most vias of a vehicle in a mission file."""
 
 TAKE_OFFS = (TAKEOFF, VTOL_TAKEOFF)
-LANDINGS = (LAND,)
+FINAL_ITEMS = (LAND,)
 SAME_E7 = 10
 """Places that differ by no more than this, in 1e-7 of a degree, are one: about a decimetre."""
 
@@ -49,12 +49,12 @@ def route_of(mission: Mission, where: str) -> FileRoute:
         if item.command in TAKE_OFFS:
             continue  # it leaves from the start
         if not flown or not (item.x or item.y):
-            if item.command not in LANDINGS:
+            if item.command not in FINAL_ITEMS:
                 others[command_name(item.command)] += 1
             continue
-        if item.command not in (WAYPOINT, SPLINE_WAYPOINT, *LANDINGS):
+        if item.command not in (WAYPOINT, SPLINE_WAYPOINT, *FINAL_ITEMS):
             others[command_name(item.command)] += 1  # its place is passed, and nothing more
-        elif item.command not in LANDINGS and item.params[0] > 0.0:
+        elif item.command not in FINAL_ITEMS and item.params[0] > 0.0:
             others["hold"] += 1
         if not places or max(abs(item.x - places[-1][0]), abs(item.y - places[-1][1])) > SAME_E7:
             places.append((item.x, item.y))
