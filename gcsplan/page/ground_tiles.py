@@ -106,8 +106,9 @@ class GroundTiles:
             return made
 
     def contours(self, z: int, x: int, y: int, unit: Unit) -> bytes | None:
-        """The contours of a tile as GeoJSON, at round numbers of ``unit``; None where there is no ground.
+        """The contours of a tile as GeoJSON, at round numbers of ``unit``: none where there is no ground, or too much.
 
+        None for a tile that the page does not request.
         Each line has its ``height_m``, and ``fifth`` for every fifth one.
         """
         if not (LEAST_ZOOM <= z <= MOST_ZOOM and 0 <= x < 2**z and 0 <= y < 2**z):
@@ -116,12 +117,12 @@ class GroundTiles:
         with self._lock:
             block = self._block((z, x, y))
             if block is None:
-                return None
+                return _geojson([])
             frame, surface, _ = block
             plane = frame.to_plane(*np.broadcast_arrays(lat[:, None], lon[None, :]))
             ground = np.ma.masked_invalid(surface.ground_at(plane[..., 0], plane[..., 1]))
         if ground.count() == 0:
-            return None
+            return _geojson([])
         made = contourpy.contour_generator(lon, lat, ground, name="serial")
         step_m = contour_interval_m(z, unit)
         low, high = math.ceil(float(ground.min()) / step_m), math.floor(float(ground.max()) / step_m)
@@ -134,7 +135,7 @@ class GroundTiles:
             for k in range(low + -low % every, high + 1, every)
             if (parts := [np.round(np.asarray(line), 6).tolist() for line in made.lines(k * step_m)])
         ]  # fmt: skip
-        return json.dumps({"type": "FeatureCollection", "features": lines}, separators=(",", ":")).encode()
+        return _geojson(lines)
 
     def _made(self, tile: TileNumber) -> bytes | None:
         block = self._block(tile)
@@ -216,6 +217,10 @@ def _lattice_deg(tile: TileNumber) -> tuple[Floats, Floats]:
     part = np.arange(CONTOUR_PARTS + 1) / CONTOUR_PARTS
     lat = np.array([_lat_deg(float(v), z) for v in y + part])
     return lat, (x + part) / 2**z * 360.0 - 180.0
+
+
+def _geojson(lines: list[dict[str, Any]]) -> bytes:
+    return json.dumps({"type": "FeatureCollection", "features": lines}, separators=(",", ":")).encode()
 
 
 def _terrarium(heights_m: Floats) -> bytes:

@@ -60,6 +60,9 @@ SPARE_DEG = 0.01
 ANSWERED_BY = {"place": "place", "section": "section", "text": "text", "inspect": "dropped"}
 """Messages that change nothing, each with the type of its answer."""
 
+SHOWN = ("vehicle", "scene")
+"""Messages on what the page shows."""
+
 
 class StepTaker(Protocol):
     """What takes the steps from the page to files and vehicles: `gcsplan.page.steps`, which knows this session."""
@@ -244,8 +247,8 @@ class MapSession:
             self._send({"type": "saved", "n": self._n, "file": file.name})
             self._send_state()
             return False
-        elif kind in ANSWERED_BY:
-            self._send({"type": ANSWERED_BY[kind], "n": self._n, **self._answer_to(message)})
+        elif kind in ANSWERED_BY or kind in SHOWN or kind in self.steps.kinds:
+            self._show(message)
             return False
         elif kind == "set_text":
             try:
@@ -270,17 +273,6 @@ class MapSession:
                 getattr(edits, kind)()
             self._disk = edits.store.disk()
             self._unkept = True
-        elif kind == "vehicle":
-            self._vehicle = _number(message.get("vehicle"))
-            self._send_state()
-            return False
-        elif kind == "scene":
-            self._shows_scene = message.get("on") is True
-            self._send_scene()
-            return False
-        elif kind in self.steps.kinds:
-            self.steps.take(message)
-            return False
         elif kind == "hello":
             edits.cancel()  # a page that comes again has dropped what it dragged
             self._shows_scene = False
@@ -290,6 +282,20 @@ class MapSession:
         self._problems = ()
         self._send_state()
         return True
+
+    def _show(self, message: PageMessage) -> None:
+        """Follow a message that changes no mission. Raises PageError, InputError."""
+        kind = message["type"]
+        if kind in ANSWERED_BY:
+            self._send({"type": ANSWERED_BY[kind], "n": self._n, **self._answer_to(message)})
+        elif kind == "vehicle":
+            self._vehicle = _number(message.get("vehicle"))
+            self._send_state()
+        elif kind == "scene":
+            self._shows_scene = message.get("on") is True
+            self._send_scene()
+        else:
+            self.steps.take(message)
 
     def _answer_to(self, message: PageMessage) -> PageMessage:
         """The answer to a message that changes nothing: a form, the text, the dropped file. Raises PageError."""

@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from itertools import product
+from typing import Any
 
 import numpy as np
 
@@ -152,7 +153,7 @@ def dearest_metre(p: Problem) -> float:
     return 1.0 if p.objective == "length" else p.vertical_j_per_m + p.horizontal_j_per_m
 
 
-def in_time(seed: int) -> dict[str, object]:
+def in_time(seed: int) -> dict[str, Any]:
     """The objective time, with speeds for one seed: fast and slow beside the rates of climb and descent."""
     rng = np.random.default_rng([seed, 52])
     rates = rng.choice([0.5, 1.5, 2.5, 5.0, 15.0], 2).tolist()
@@ -163,8 +164,9 @@ def in_time(seed: int) -> dict[str, object]:
 def reverse(p: Problem) -> Problem:
     """The same mission flown backwards: every path of one, reversed, is a path of the other."""
     limits = replace(p.limits, max_climb_deg=p.limits.max_descent_deg, max_descent_deg=p.limits.max_climb_deg)
-    rates = {"climb_m_s": p.descent_m_s, "descent_m_s": p.climb_m_s}
-    return replace(p, start=p.goal, goal=p.start, via=p.via[::-1], limits=limits, **rates)
+    return replace(
+        p, start=p.goal, goal=p.start, via=p.via[::-1], limits=limits, climb_m_s=p.descent_m_s, descent_m_s=p.climb_m_s
+    )  # fmt: skip
 
 
 def exact_past_discs(case: Case) -> float:

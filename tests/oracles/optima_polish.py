@@ -69,7 +69,7 @@ def leg_costs(problem: Problem, a: Floats, b: Floats) -> Floats:
     flat = np.hypot(d[..., 0], d[..., 1])
     if problem.objective == "time":
         times = flat / problem.speed_m_s, d[..., 2] / problem.climb_m_s, -d[..., 2] / problem.descent_m_s
-        return np.maximum.reduce(times)
+        return np.asarray(np.maximum.reduce(times))
     if problem.objective == "energy":
         return problem.horizontal_j_per_m * flat + problem.vertical_j_per_m * np.abs(d[..., 2])
     return np.hypot(flat, d[..., 2])

@@ -77,7 +77,7 @@ def on_board_of(plan: Plan, v: VehiclePlan, mission: Mission, units: Units) -> d
     wording = Wording(units)
     verdict = judge(
         mission, v.request.vehicle, plan.world, rtl_rel_home_m=v.request.rtl_rel_home_m,
-        terrain_error_m=plan.source.terrain_error_m, wind=plan.source.flight_wind,
+        terrain_error_m=plan.source.terrain_error_m, wind=plan.source.flight_wind(v.request),
     )  # fmt: skip
     [difference] = differences(plan, {v.name: EarlierMission(ON_BOARD, mission)}).values()
     return {
