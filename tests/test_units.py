@@ -248,7 +248,8 @@ def test_what_the_numbers_are(capsys: pytest.CaptureFixture[str]) -> None:
     row = plan_rows(METRIC)[0]
     v = planned()[0].vehicles[0]
     assert list(row) == [
-        "vehicle", "items", "length, m", "above the bound, %", "energy, kJ", "energy, Wh", "energy, mAh", "battery, %",
+        "vehicle", "items", "length, m", "path at full speed", "above the bound, %", "energy, kJ", "energy, Wh",
+        "energy, mAh", "battery, %",
         "lowest AGL, m", "highest AGL, m", "nearest zone, m", "over or under a zone, m", "steepest, °", "speed, m/s",
         "departs", "arrives", "within", "verdict",
     ]  # fmt: skip

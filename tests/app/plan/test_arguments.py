@@ -22,7 +22,7 @@ def no_planner(problem: object) -> None:
         ({"seed": "1"}, "seed is a whole number; given str '1'"),
         ({"seed": True}, "seed is a whole number"),
         ({"options": 3}, "options is a mapping"),
-        ({"objective": 3}, "objective is 'length' or 'energy'"),
+        ({"objective": 3}, "objective is 'length', 'energy' or 'time'"),
         ({"progress": 3}, "progress is a function"),
         ({"gate_utc": "18:30"}, "gate_utc is a datetime"),
     ],

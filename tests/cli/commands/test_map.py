@@ -11,6 +11,8 @@ from typing import Any
 
 import pytest
 
+import gcsplan
+
 pytest.importorskip("starlette", reason="the extra map is not installed")
 
 FLAT = (
@@ -44,6 +46,7 @@ def test_ctrl_c_ends_the_server_and_keeps_the_edits(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("package", ["starlette.applications", "pmtiles.reader"])
 def test_a_missing_package_is_one_line_with_its_cure(run: Any, monkeypatch: pytest.MonkeyPatch, package: str) -> None:
+    monkeypatch.setattr(gcsplan, "page", sys.modules.get("gcsplan.page"), raising=False)  # put back with its modules
     for name in [name for name in sys.modules if name.startswith("gcsplan.page")]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, package, None)
