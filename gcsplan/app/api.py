@@ -18,7 +18,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, overload
 
@@ -103,15 +102,18 @@ def check(
     if isinstance(what, Plan):
         if within is not None or vehicle is not None:
             raise UsageError("a plan is judged whole, in its own world: give nothing else to check")
-        source, flown = what.source if wind is None else in_other_winds(what.source, wind), []
+        source = what.source if wind is None else in_other_winds(what.source, wind)
         flies = {r.vehicle.name: r.vehicle for r in source.vehicles} if wind is not None else {}
-        for v in what.vehicles:
-            again = judge(
+        verdicts = [
+            judge(
                 v.mission, flies.get(v.name, v.request.vehicle), what.world, rtl_rel_home_m=v.request.rtl_rel_home_m,
                 terrain_error_m=source.terrain_error_m, wind=source.flight_wind(v.request),
-            )  # fmt: skip
-            flown.append(replace(v, verdict=again))
-        return {v.name: v.verdict for v in (flown if what.fleet is None else within_hours(source, flown, what.fleet))}
+            )
+            for v in what.vehicles
+        ]  # fmt: skip
+        if what.fleet is not None:
+            verdicts = within_hours(source, what.vehicles, verdicts, what.fleet)
+        return {v.name: verdict for v, verdict in zip(what.vehicles, verdicts, strict=True)}
     if within is None:
         raise UsageError("in which world? Give check a plan or a mission file as its second argument")
     if isinstance(within, Plan):

@@ -35,7 +35,7 @@ def test_fleets_are_in_sequence_in_every_kind_of_wind(tmp_path: Path) -> None:
 
 
 @pytest.mark.nightly
-def test_fleets_that_lose_their_intervals_are_counted_and_only_broken_words_are_faults() -> None:
+def test_lost_intervals_are_counted_and_only_broken_words_are_faults() -> None:
     result = wind.run_fleets(2, seed=1)
     assert sum(row["fleets"] for row in result["kinds"].values()) + sum(result["refused"].values()) == 2
     assert all(row["held"] + row["in_still_air"] >= row["fleets"] for row in result["kinds"].values())

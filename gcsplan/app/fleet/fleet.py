@@ -109,7 +109,10 @@ def finished(
     leaving.require_some(vehicles)
     source = brief.source
     flown, fleet = fleet_of(vehicles, brief, gate, leaving)
-    flown = within_hours(source, flown, fleet)
+    judged = within_hours(source, flown, [v.verdict for v in flown], fleet)
+    flown = tuple(
+        v if verdict is v.verdict else replace(v, verdict=verdict) for v, verdict in zip(flown, judged, strict=True)
+    )
     notes: list[Note] = list(source.notes)
     if len(flown) > 1 and source.arrival is None:
         notes.append(Note("no_arrival_asked"))

@@ -56,20 +56,25 @@ def beyond_forecast(verdict: Verdict, waits_s: float = 0.0) -> Note | None:
     return Note("flies_beyond_forecast", until=_shown(datetime.fromtimestamp(until_s, UTC)))
 
 
-def within_hours(source: MissionFile, flown: Sequence[VehiclePlan], fleet: FleetPlan) -> tuple[VehiclePlan, ...]:
-    """The vehicles of a plan; a flight without an end is not judged, if zones were left out for the hours, and none is
-    beyond those of a forecast of the wind.
+def within_hours(
+    source: MissionFile, vehicles: Sequence[VehiclePlan], verdicts: Sequence[Verdict], fleet: FleetPlan
+) -> list[Verdict]:
+    """The verdicts on a plan's vehicles; a flight without an end is not judged, if zones were left out for the hours,
+    and none is beyond those of a forecast of the wind.
 
     Raises InputError if a flight lasts beyond them.
     """
-    flown = [_not_judged(v, beyond_forecast(v.verdict, waits_s(v, fleet))) for v in flown]
+    flown = [
+        _not_judged(verdict, beyond_forecast(verdict, waits_s(v, fleet)))
+        for v, verdict in zip(vehicles, verdicts, strict=True)
+    ]
     hours = source.hours
     if hours is None:
-        return tuple(flown)
+        return flown
     start = fleet.start_utc or hours.start
     judged = []
-    for v in flown:
-        end = landing_of(v.verdict, start + timedelta(seconds=waits_s(v, fleet)))
+    for v, verdict in zip(vehicles, flown, strict=True):
+        end = landing_of(verdict, start + timedelta(seconds=waits_s(v, fleet)))
         if start < hours.start or (end is not None and end > hours.end):
             lasts = "without end" if end is None else f"to {_shown(end)}"
             raise InputError(
@@ -77,14 +82,13 @@ def within_hours(source: MissionFile, flown: Sequence[VehiclePlan], fleet: Fleet
                 f"{WRITE}",
                 where=f"{source.path}: at",
             )
-        judged.append(_not_judged(v, None if end is not None else Note("hours_without_landing", hours=str(hours))))
-    return tuple(judged)
+        without = None if end is not None else Note("hours_without_landing", hours=str(hours))
+        judged.append(_not_judged(verdict, without))
+    return judged
 
 
-def _not_judged(v: VehiclePlan, why: Note | None) -> VehiclePlan:
-    if why is None:
-        return v
-    return replace(v, verdict=replace(v.verdict, not_judged=(*v.verdict.not_judged, why)))
+def _not_judged(verdict: Verdict, why: Note | None) -> Verdict:
+    return verdict if why is None else replace(verdict, not_judged=(*verdict.not_judged, why))
 
 
 def hours_left(source: MissionFile, v: VehiclePlan, fleet: FleetPlan | None) -> Hours | None:

@@ -26,6 +26,7 @@ from gcsplan.errors import Cancelled, CheckFailed, GcsplanError, InputError, NoM
 from gcsplan.export.outdir import add_output, outputs_in, retire_outputs, settle_outputs, write_outputs
 from gcsplan.notes.note import Wording
 from gcsplan.page.edits import Edits
+from gcsplan.page.fleet.time_table import numbers_of
 from gcsplan.page.map_session import PageMessage
 from gcsplan.page.refused import PageError
 from gcsplan.page.steps.shown_plan import ShownPlan
@@ -255,13 +256,13 @@ class PageSteps:
     def _on_board(self, n: int, shown: ShownPlan, targets: Mapping[str, str]) -> PageMessage:
         from gcsplan.page.steps.words import on_board_of
 
-        plan, vehicles = shown.plan, []
+        plan, numbers, vehicles = shown.plan, numbers_of(shown.plan), []
         with self._addresses(plan, targets) as where:
             missions = uploads.on_board(plan.source, where)
-        for number, v in enumerate(plan.vehicles):
+        for v in plan.vehicles:
             if v.name in missions:
                 board = on_board_of(plan, v, missions[v.name], self._units())
-                vehicles.append({"name": v.name, "vehicle": number, **board})
+                vehicles.append({"name": v.name, "vehicle": numbers[v.name], **board})
         return {"type": "on_board", "n": n, "code": 0, "message": "", "vehicles": vehicles}
 
     @contextmanager
@@ -278,7 +279,7 @@ class PageSteps:
         plan = self._shown.plan
         targets = _targets(message, plan)
         sysids = {v.name: v.request.vehicle.sysid for v in plan.vehicles}
-        numbers = {v.name: k for k, v in enumerate(plan.vehicles)}
+        numbers = numbers_of(plan)
         self._where, self._live, self._heard_s = str(message["to"]), {}, {}
         self._connection += 1
         connection = self._connection

@@ -1,5 +1,6 @@
 // What every figure shares: the numbers of the page, their wording, the tip beside the pointer, and who is pointed at.
-const data = globalThis.data || JSON.parse(document.getElementById('data').textContent); // the map to plan on has no block of data
+const block = document.getElementById('data'); // the map to plan on has none
+const data = block ? JSON.parse(block.textContent) : globalThis.data;
 
 // The units of the page: by kind (path, leg, far, distance, height, amsl, speed, climb_rate) the symbol, the size in SI,
 // and the decimals more than in SI. All data are in SI; a unit of this table converts them where they are worded.

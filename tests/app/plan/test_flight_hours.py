@@ -71,13 +71,13 @@ def test_a_plan_that_lasts_beyond_its_hours_is_refused_by_its_vehicle() -> None:
     assert made.fleet is not None
     fleet = replace(made.fleet, start_utc=None)
     enough = replace(made.source, hours=hours(24 * 3600))
-    [v] = within_hours(enough, made.vehicles, fleet)
-    assert v.verdict.not_judged == made.vehicles[0].verdict.not_judged
+    verdicts = [v.verdict for v in made.vehicles]
+    assert within_hours(enough, made.vehicles, verdicts, fleet) == verdicts
     with pytest.raises(InputError, match=r"uav1 flies from 2026-11-24 10:00Z to .*; write at: \[from, to\]"):
-        within_hours(replace(made.source, hours=hours(60)), made.vehicles, fleet)
+        within_hours(replace(made.source, hours=hours(60)), made.vehicles, verdicts, fleet)
     late = replace(fleet, start_utc=TEN - timedelta(minutes=1))
     with pytest.raises(InputError, match="flies from 2026-11-24 09:59Z"):
-        within_hours(enough, made.vehicles, late)
+        within_hours(enough, made.vehicles, verdicts, late)
 
 
 def test_a_vehicle_that_waits_has_fewer_hours_left() -> None:
