@@ -32,7 +32,10 @@ SPEEDUP = 30.0
 OPTIONS = SessionOptions(unchecked=True, listen_s=0.0, timers=Timers(response_s=0.3, item_s=0.03, silence_s=3.0))
 
 
-@pytest.mark.parametrize(("autopilot", "items", "seed"), [(COPTER, 50, 1), (PX4, 50, 2), (COPTER, 600, 3)])
+@pytest.mark.parametrize(
+    ("autopilot", "items", "seed"),
+    [(COPTER, 50, 1), (PX4, 50, 2), pytest.param(COPTER, 600, 3, marks=pytest.mark.nightly)],
+)
 def test_at_ten_percent_loss_an_upload_ends_verified(autopilot: Autopilot, items: int, seed: int) -> None:
     vehicle, mission = a_vehicle(autopilot), a_mission(autopilot, items)
     with (

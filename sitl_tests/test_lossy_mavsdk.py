@@ -21,7 +21,10 @@ TIMEOUT_S = 10.0
 OPTIONS = SessionOptions(unchecked=True, listen_s=0.1, timeout_s=TIMEOUT_S, discover_s=20.0)
 
 
-@pytest.mark.parametrize(("loss", "seed"), [(0.1, 1), (0.3, 2), (0.6, 3), (0.6, 4)])
+@pytest.mark.parametrize(
+    ("loss", "seed"),
+    [(0.1, 1), *(pytest.param(*more, marks=pytest.mark.nightly) for more in ((0.3, 2), (0.6, 3), (0.6, 4)))],
+)
 def test_a_mavsdk_vehicle_that_is_called_verified_holds_the_mission(loss: float, seed: int) -> None:
     """MAVSDK gives up after five losses in a row with a part on board: the outcome is then unknown, within a bound."""
     mission = a_mission(PX4, 20)
@@ -46,7 +49,7 @@ def test_a_mavsdk_vehicle_that_is_called_verified_holds_the_mission(loss: float,
     assert loss > 0.2 or result.verified
 
 
-@pytest.mark.parametrize(("loss", "seed"), [(0.1, 5), (0.6, 6)])
+@pytest.mark.parametrize(("loss", "seed"), [(0.1, 5), pytest.param(0.6, 6, marks=pytest.mark.nightly)])
 def test_our_vehicle_holds_what_mavsdk_calls_a_success(loss: float, seed: int) -> None:
     """Our loopback vehicle under loss: it never answers "accepted" with another mission on board."""
     board = a_vehicle(PX4)

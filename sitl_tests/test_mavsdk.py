@@ -80,7 +80,7 @@ def test_odd_numbers_arrive_at_a_mavsdk_vehicle_bit_by_bit() -> None:
         assert wires(vehicle.received()) == [item.wire for item in mission.wire_items()]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.usefixtures("hasty_requests")
 def test_all_three_lists_of_a_mavsdk_vehicle_are_kept_apart() -> None:
     mission = a_mission(PX4, 12)

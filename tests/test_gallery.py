@@ -15,18 +15,20 @@ from gcsplan.mavlink.files.formats import read_mission_file
 from gcsplan.mavlink.mission.compare import compare, faults
 from tests.support.paths import MISSIONS
 
-SLOW = {"fleet-100", "fleet-4", "jacksboro-high", "jacksboro-wing"}
+SLOW = {"fleet-4", "jacksboro-high", "jacksboro-wing"}
+NIGHTLY = {"fleet-100"}
+
+
+def marks(file: Path) -> list[pytest.MarkDecorator]:
+    """Which suite plans a mission, once for all tests of its group."""
+    kind = [pytest.mark.slow] * (file.stem in SLOW) + [pytest.mark.nightly] * (file.stem in NIGHTLY)
+    return [pytest.mark.xdist_group(file.stem), *kind]
+
 
 planned_once = cache(lambda file: plan(load_mission(file)))
 
 
-@pytest.mark.parametrize(
-    "file",
-    [
-        pytest.param(f, id=f.stem, marks=[pytest.mark.xdist_group(f.stem), *[pytest.mark.slow] * (f.stem in SLOW)])
-        for f in MISSIONS.glob("*.yaml")
-    ],
-)
+@pytest.mark.parametrize("file", [pytest.param(f, id=f.stem, marks=marks(f)) for f in MISSIONS.glob("*.yaml")])
 def test_a_mission_of_the_gallery_is_safe_and_its_files_are_what_was_judged(file: Path, tmp_path: Path) -> None:
     planned = planned_once(file)
     files = outputs_of(planned)
@@ -42,9 +44,7 @@ def test_a_mission_of_the_gallery_is_safe_and_its_files_are_what_was_judged(file
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "file", [pytest.param(f, id=f.stem, marks=pytest.mark.xdist_group(f.stem)) for f in MISSIONS.glob("*.yaml")]
-)
+@pytest.mark.parametrize("file", [pytest.param(f, id=f.stem, marks=marks(f)) for f in MISSIONS.glob("*.yaml")])
 def test_every_mission_of_the_gallery_has_a_safe_return_from_all_of_its_paths(file: Path) -> None:
     homes = homes_of(planned_once(file))
     for name, home in homes.items():

@@ -112,7 +112,7 @@ def test_a_slit_without_errors_is_flown() -> None:
     assert v.cost == pytest.approx(1000.0, abs=0.1)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_what_only_the_margins_shut_is_not_proved() -> None:
     """2 cm wider than the check asks for; a hand-made mission flies through."""
     with pytest.raises(NoMission) as caught:

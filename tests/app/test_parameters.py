@@ -241,7 +241,7 @@ def test_a_required_return_that_runs_on_farther_is_judged_so_where_that_is_allow
 # -- returns at the autopilot's own speed ----------------------------------------------------------------------------
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_return_is_timed_at_the_speed_that_arducopter_flies() -> None:
     for speed in (5, 15):
         done = planned(keys(speed_m_s=[speed, speed], lean_angle_deg=55, **RTL))
@@ -329,7 +329,7 @@ def test_the_lean_that_a_speed_needs_has_something_to_spare() -> None:
 # -- a rehearsal with the vehicle's own --------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_rehearsal_flies_with_the_parameters_of_a_file_or_a_vehicle(tmp_path: Path) -> None:
     done = planned(keys(**RTL))
     file = tmp_path / "board.param"

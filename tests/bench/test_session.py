@@ -7,7 +7,7 @@ import pytest
 from gcsplan.bench import session
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_bench_measures_paths_cancels_and_memory() -> None:
     result = session.run(changes=2, cancels=3, memory_changes=20)
     for terrain in ("sample", "degree"):

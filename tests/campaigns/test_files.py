@@ -16,7 +16,7 @@ from tests.campaigns import files
 from tests.support.paths import REPOSITORY
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.skipif(os.name != "posix", reason="measures memory as POSIX does")
 def test_a_short_campaign_of_hostile_files_finds_nothing() -> None:
     command = [sys.executable, "-m", "tests.campaigns.files", "--seconds", "60", "--seed", "1", "--inputs", "40"]

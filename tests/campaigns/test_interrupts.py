@@ -18,8 +18,7 @@ from tests.support.paths import REPOSITORY
 linux = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks at processes as Linux shows them")
 
 
-@pytest.mark.slow
-@pytest.mark.nightly_but("plan")
+@pytest.mark.nightly
 @linux
 @pytest.mark.parametrize("kind", list(interrupts.KINDS))
 def test_a_short_campaign_of_signals_finds_nothing(kind: str) -> None:

@@ -15,7 +15,7 @@ from tests.campaigns.limits import run
 FOREVER_S = 1e9
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_nothing_that_is_called_safe_at_the_limit_is_unsafe() -> None:
     tally = run(FOREVER_S, 3, ("px4", "terrain", "spline", "wing", "battery"), most=1, turns=1)
     assert tally.unsafe == []

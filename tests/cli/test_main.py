@@ -106,7 +106,7 @@ def test_ctrl_c_is_exit_130(run: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     assert run("plan", CROSSING)[0] == 130
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_results_go_to_standard_output_and_all_else_to_standard_error(run: Any, tmp_path: Path) -> None:
     asides = ("note: ", "planning ", "compiling ")
     with SimServer([vehicle()], "udpin:127.0.0.1:0", speedup=10.0) as server:

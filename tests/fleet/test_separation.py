@@ -19,7 +19,7 @@ from gcsplan.fleet.separation import Conflict, Rules, in_metres, separation
 from gcsplan.notes.note import Note
 from tests.support.effort import draws
 
-FLEETS = [range(60), pytest.param(range(60, 1000), marks=pytest.mark.slow)]
+FLEETS = [range(60), pytest.param(range(60, 1000), marks=pytest.mark.nightly)]
 SAMPLE_S = 1e-3
 
 

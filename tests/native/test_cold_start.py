@@ -70,8 +70,7 @@ def seen() -> dict[str, dict[str, object]]:
     return {}
 
 
-@pytest.mark.slow
-@pytest.mark.nightly_but("newest")
+@pytest.mark.nightly
 @pytest.mark.parametrize("which", ["oldest", "newest"])
 def test_a_first_run_needs_no_numba(which: str, tmp_path: Path, seen: dict[str, dict[str, object]]) -> None:
     """In an environment of its own, whose other packages are those of this one."""

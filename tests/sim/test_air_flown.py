@@ -29,7 +29,7 @@ def test_the_battery_is_the_integral_over_the_air_flown(wind_m_s: float, from_de
     assert v.battery_used_percent == pytest.approx(100 * wanted_j / BATTERY_J, rel=0.01)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_head_wind_costs_time_and_metres_and_a_late_flight_is_not_as_planned() -> None:
     calm = flown()
     assert calm.safe is True
@@ -46,7 +46,7 @@ def test_a_head_wind_costs_time_and_metres_and_a_late_flight_is_not_as_planned()
     assert used > 1.2 * told
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_worst_run_counts_and_a_reserve_that_is_used_is_no_flight_as_planned() -> None:
     gusty = Weather(6.0, None, 1.5)
     result = flown(gusty, runs=4)

@@ -448,7 +448,7 @@ def test_clear_says_what_examine_says_of_ten_thousand_legs_over_mountains() -> N
         assert (v.east_m, v.north_m, v.amsl_m) == pytest.approx(tuple(at))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_several_threads_may_share_an_airspace() -> None:
     rng = np.random.default_rng(5)
     airspace = flat([Zone("u", NOTCH), Zone("z", Circle(1000, 0, 300), None, Level(50.0, "agl"))])

@@ -61,7 +61,7 @@ def test_a_return_path_goes_before_an_altitude_above_max_agl_which_says_so() -> 
     assert homes_of(done)["uav1"].no_return_m == proposals[0].leaves_m
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_where_the_battery_is_short_an_earlier_landing_comes_last_and_is_safe() -> None:
     battery = {"energy": {"horizontal_j_per_m": 100, "vertical_j_per_m": 100, "battery_j": 420_000, "reserve": 0.2}}
     done, proposals = tried(**battery)

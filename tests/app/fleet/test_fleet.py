@@ -248,7 +248,7 @@ def test_in_the_terrain_frame_a_vehicle_is_where_the_ground_has_it() -> None:
         assert len(flown.items) == len(flown.points) + 1
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_papers_sequence_and_together_arrive_by_their_ideal_arithmetic() -> None:
     done = plan(load_mission(MISSIONS / "papers" / "ib-abc-sequence.yaml"))
     told = summary_of(done)["vehicles"]

@@ -507,7 +507,7 @@ def test_the_files_it_exports_pass_the_check(circling: Plan, tmp_path: FilePath)
         assert checked.verdict.safe is True, checked.verdict.describe()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_landing_glides_from_the_approach_and_a_wanted_heading_is_kept(landing: Plan) -> None:
     (v,) = landing.vehicles
     assert v.verdict.safe is True
@@ -543,7 +543,7 @@ def test_it_flies_at_one_speed_from_the_ground_to_the_goal_and_arrives_flying(la
     assert motion.arrive_s < motion.times_s[-1] - 10.0
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_known_climb_out_has_one_time_in_plan_fleet_and_simulation(circling: Plan) -> None:
     text = text_of(end="loiter\n    climb_out_m_s: 9.5\n    climb_out_speed_m_s: 25")
     known = plan(load_mission(MISSIONS / "m.yaml", text=text))

@@ -47,6 +47,7 @@ def test_starts_and_goals_are_legal_and_as_low_as_can_be(main: list[NamedProblem
             assert 60.0 <= amsl - float(a.surface.ground_at(east, north)) < 60.1
 
 
+@pytest.mark.nightly
 def test_everyday_missions_are_problems_too() -> None:
     few = problems("everyday", 1, count=1)
     assert {p.group for p in few} <= set(everyday_missions.EVERYDAY_KINDS) - {"vias"}

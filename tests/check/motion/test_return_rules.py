@@ -148,7 +148,7 @@ def test_a_plane_turns_about_within_the_formula_wherever_home_lies(speed: float)
     assert 0.6 * about < worst < about
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_fifty_random_returns_fly_within_the_judged_places_and_no_lower() -> None:
     found = [in_twin(seed, (COPTER, PLANE)[seed % 2]) for seed in range(50)]
     assert [f for f in found if not f.as_judged] == []

@@ -224,7 +224,7 @@ def many(count: int, corners: int) -> list[Any]:
     return zones
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_1200_zones_add_at_most_a_second(tmp_path: Path) -> None:
     zones = many(1200, 40)
 

@@ -146,7 +146,7 @@ def test_bound_is_never_over_and_path_never_under_what_is_known(family: str) -> 
     assert len(missed) <= MOST_MISSED.get(family, 0.1) * len(verdicts), "\n".join(missed)
 
 
-@pytest.mark.nightly_but("clearances+voids")
+@pytest.mark.nightly
 @pytest.mark.parametrize("family", HOLED)
 def test_no_void_makes_a_bound_or_a_proof_wrong(family: str) -> None:
     verdicts = [judge(family, seed, BRIEF) for seed in range(HOLED_WORLDS)]

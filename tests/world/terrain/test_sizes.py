@@ -96,7 +96,7 @@ def test_too_many_cells_are_refused_before_they_are_read(tmp_path: Path, monkeyp
 
 @pytest.mark.slow
 @PROC
-@pytest.mark.parametrize("more", [(), ("--report",)])
+@pytest.mark.parametrize("more", [(), pytest.param(("--report",), marks=pytest.mark.nightly)])
 def test_as_many_cells_as_are_taken_need_a_gigabyte_at_most(
     more: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -281,8 +281,8 @@ def test_a_ridge_right_behind_a_low_ceiling_is_farther_than_the_plane_tells() ->
     assert max(proved) <= 2950.0 + 2500.0
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("around_m", [300.0, pytest.param(600.0, marks=pytest.mark.nightly)])
+@pytest.mark.nightly
+@pytest.mark.parametrize("around_m", [300.0, 600.0])
 def test_the_way_around_a_wall_does_not_make_up_for_a_climb_before_it(around_m: float) -> None:
     """A step across the map that takes 1380 m of track to climb, and behind it a wall with the goal on its far side.
 

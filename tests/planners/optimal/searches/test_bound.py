@@ -28,7 +28,7 @@ from tests.support.planner_worlds import Floats, ground
 from tests.support.searches import work_of
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_bound_over_several_legs_goes_on_while_legs_get_better() -> None:
     """Before each ridge the climb takes more metres than there are. With one cut after a prediction, and without what
     the legs' own bounds prove, the gap was 31 %."""

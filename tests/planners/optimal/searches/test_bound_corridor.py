@@ -132,8 +132,7 @@ def _dense(track: Floats, problem: Problem) -> Floats:
     return problem.floors(*(np.interp(t, s, track[:, k]) for k in range(2)))
 
 
-@pytest.mark.slow
-@pytest.mark.nightly_but("301-main 301/02, 40 zones-11690.0")
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("seed", "name", "most_m"),
     [

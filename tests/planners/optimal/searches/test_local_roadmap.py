@@ -111,7 +111,7 @@ def test_stops_are_passed_in_their_order_at_their_heights() -> None:
     assert stops[1, 2] == 40.0
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_worlds_with_very_many_zones_are_searched_as_well() -> None:
     rng = np.random.default_rng(5)
     discs = [(float(e), float(n), 4.0) for e, n in rng.uniform(0.0, 2000.0, (900, 2)) if abs(e - 1000.0) < 280.0]
