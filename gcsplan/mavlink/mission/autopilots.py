@@ -13,17 +13,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from gcsplan.errors import InputError
 from gcsplan.mavlink.mission import commands as cmd
-from gcsplan.mavlink.mission.mission import FENCE, FRAME_SYNONYMS, MISSION, NO_POSITION, MissionItem, float32
+from gcsplan.mavlink.mission.mission import FENCE, FRAME_SYNONYMS, MISSION, NO_POSITION, Mission, MissionItem, float32
 from gcsplan.mavlink.mission.mission import MissionItem as Item
 from gcsplan.mavlink.mission.stored_ardupilot import (
+    read_back_altitudes,
     refused_by_copter,
     refused_by_plane,
     stored_by_copter,
     stored_by_plane,
+    stored_cm,
 )
 from gcsplan.mavlink.mission.stored_px4 import refused_by_px4, stored_by_px4
 from gcsplan.vehicle import Autopilot
@@ -128,6 +130,26 @@ def autopilot_of(mav_autopilot: int, mav_type: int) -> Autopilot | None:
 def stored(item: Item, autopilot: Autopilot) -> Item:
     """Return ``item`` as it reads back from ``autopilot``."""
     return _TABLE[autopilot].stored(item)
+
+
+def sent_for(mission: Mission) -> Mission:
+    """The mission that its autopilot stores as this one, which was read back from it.
+
+    ArduPilot truncates metres to centimetres, and some of them read back just below the whole centimetre: 7163 as
+    71.62999… m. Whoever stores such an item again, as every check does, would judge it a centimetre lower than it is.
+    """
+    if not mission.autopilot.is_ardupilot:
+        return mission
+    return replace(mission, items=tuple(_sent_for(item, mission.autopilot) for item in mission.items))
+
+
+def _sent_for(item: MissionItem, autopilot: Autopilot) -> MissionItem:
+    if not abs(item.z) < ALTITUDE_LIMIT_M:
+        return item
+    cm = round(item.z * 100.0)
+    if stored_cm(item.z) == cm or item.z not in read_back_altitudes(cm):
+        return item
+    return replace(item, z=altitude_of_cm(cm, autopilot))
 
 
 def max_items(autopilot: Autopilot, mission_type: int = MISSION) -> int:

@@ -12,6 +12,7 @@ from gcsplan.app.upload.on_board import settings_of
 from gcsplan.check.judge import judge
 from gcsplan.check.returns.words import verdict_words
 from gcsplan.errors import GcsplanError
+from gcsplan.mavlink.mission.autopilots import sent_for
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.mavlink.mission.parameter_list import off
 from gcsplan.notes.note import Note, Wording
@@ -76,7 +77,7 @@ def on_board_of(plan: Plan, v: VehiclePlan, mission: Mission, units: Units) -> d
         return {"line": [], "verdict": "", "headline": "there is no mission on board", "rows": [], "remarks": []}
     wording = Wording(units)
     verdict = judge(
-        mission, v.request.vehicle, plan.world, rtl_rel_home_m=v.request.rtl_rel_home_m,
+        sent_for(mission), v.request.vehicle, plan.world, rtl_rel_home_m=v.request.rtl_rel_home_m,
         terrain_error_m=plan.source.terrain_error_m, wind=plan.source.flight_wind(v.request),
     )  # fmt: skip
     [difference] = differences(plan, {v.name: EarlierMission(ON_BOARD, mission)}).values()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gcsplan.errors import InputError
-from gcsplan.mavlink.mission.autopilots import altitude_of_cm, autopilot_of, max_items, profile_of, stored
-from gcsplan.mavlink.mission.mission import FENCE, FRAME_SYNONYMS, GLOBAL, RALLY, MissionItem, float32
+from gcsplan.mavlink.mission.autopilots import altitude_of_cm, autopilot_of, max_items, profile_of, sent_for, stored
+from gcsplan.mavlink.mission.mission import FENCE, FRAME_SYNONYMS, GLOBAL, RALLY, Home, Mission, MissionItem, float32
 from gcsplan.mavlink.mission.stored_ardupilot import STORAGE_RULES, read_back_altitudes, stored_cm
 from gcsplan.mavlink.mission.stored_px4 import LOCATED, yaw
 from gcsplan.mavlink.mission.stored_px4 import LOCATED as PX4_LOCATED
@@ -72,6 +73,17 @@ def test_an_altitude_that_cannot_be_kept_is_refused(cm: int) -> None:
 @given(st.floats(-80_000, 80_000, width=32))
 def test_centimetres_are_cut_as_float32_hardware_cuts_them(altitude_m: float) -> None:
     assert stored_cm(altitude_m) == int((np.float32(altitude_m) * np.float32(100)).astype(np.int32))
+
+
+@pytest.mark.parametrize("autopilot", ARDUPILOTS)
+@pytest.mark.parametrize("way", [0, 1])
+def test_what_was_read_back_is_judged_at_the_centimetre_that_is_stored(autopilot: Autopilot, way: int) -> None:
+    home = Home.at(46.5, 8.5, 400.0)
+    heights = [read_back_altitudes(cm)[way] for cm in (0, 3641, 7163, -7270, 28876, 829_999, *range(1, 30_000, 97))]
+    board = Mission(autopilot, home, tuple(item(16, z=z) for z in heights))
+    again = [stored_cm(kept.z) for kept in sent_for(board).items]
+    assert again == [round(z * 100.0) for z in heights]
+    assert sent_for(replace(board, items=(item(16, z=36.415),))).items[0].z == float32(36.415)  # never read back
 
 
 @pytest.mark.parametrize(("sent", "cm"), [(17.13, 1712), (-17.13, -1712), (0.009, 0), (-0.009, 0), (60.005, 6000)])

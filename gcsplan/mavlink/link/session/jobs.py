@@ -46,7 +46,7 @@ from gcsplan.mavlink.link.session.steps import (
 )
 from gcsplan.mavlink.link.terrain import TERRAIN_GROUPS, flies_terrain, terrain_steps
 from gcsplan.mavlink.link.watch import VehicleState, Watch
-from gcsplan.mavlink.mission.autopilots import ARDUPILOTMEGA, max_items
+from gcsplan.mavlink.mission.autopilots import ARDUPILOTMEGA, max_items, sent_for
 from gcsplan.mavlink.mission.autopilots import PX4 as MAV_PX4
 from gcsplan.mavlink.mission.compare import compare, faults
 from gcsplan.mavlink.mission.mission import FENCE, MISSION, Mission
@@ -358,7 +358,7 @@ def result_of(
         mission = Mission.from_wire(
             task.autopilot, settled.read_back, home=task.mission.home, name=task.name, sysid=task.sysid
         )
-        failed = yield from judging(channel, task, mission, values, recheck)
+        failed = yield from judging(channel, task, sent_for(mission), values, recheck)
         warnings = warnings + other_home(task.mission, settled.read_back)
     return UploadResult(
         task.name,
