@@ -42,7 +42,7 @@ def gcsplan(*words: str, cwd: Path) -> tuple[int, dict[str, Any], str]:
     return done.returncode, json.loads(done.stdout), done.stderr
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_plan_reaches_mavsdk_vehicles_with_the_same_wire_numbers(tmp_path: Path) -> None:
     (tmp_path / "field.yaml").write_text(textwrap.dedent(MISSION))
     with MavsdkVehicle(sysid=1) as one, MavsdkVehicle(sysid=2) as two:

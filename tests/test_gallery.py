@@ -55,7 +55,7 @@ def test_every_mission_of_the_gallery_has_a_safe_return_from_all_of_its_paths(fi
             assert (str(home.headline), home.set_leaves_m) == ("path safe; safe return from all of it", 0.0), name
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_proposed_rally_points_stand_in_the_plan_file_on_request_alone() -> None:
     endless = (MISSIONS / "jacksboro.yaml").read_text(encoding="utf-8").replace(", ceiling_amsl_m: 900", "")
     planned = plan(load_mission("jacksboro.yaml", text=endless))

@@ -122,7 +122,7 @@ def test_rows_as_csv_and_parquet() -> None:
     assert table.to_pydict() == {"a": [1.5, None], "b": ["x,y", None]}
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_processes_make_the_same_files(folder: Path, tmp_path: Path) -> None:
     pytest.importorskip("distributed")
     alone, shared = tmp_path / "alone", tmp_path / "shared"

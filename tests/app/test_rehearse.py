@@ -253,7 +253,7 @@ def flying(
         yield seats
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_vehicles_that_fly_by_themselves_are_armed_released_watched_and_judged(
     planned: Plan, monkeypatch: pytest.MonkeyPatch
 ) -> None:

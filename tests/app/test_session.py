@@ -296,7 +296,7 @@ def test_memory_stays_flat_over_ten_thousand_changes() -> None:
     assert grown_bytes(10_000) < 500_000
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_memory_stays_flat_over_some_changes() -> None:
     assert grown_bytes(100) < 300_000
 

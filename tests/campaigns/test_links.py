@@ -12,7 +12,7 @@ from gcsplan.vehicle import Autopilot
 from tests.campaigns.links import Run, campaign, main
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_nothing_is_found_among_adversaries() -> None:
     counts, found = campaign(range(1, 26))
     assert found == []

@@ -101,7 +101,7 @@ def test_corners_cut_into_a_zone_are_found_by_the_check_and_on_the_flown_track()
     assert "mast" in str(result.breaches[0].message)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_every_run_has_its_own_weather_and_the_same_seed_the_same_figures() -> None:
     parts = [a_part(1, (0, 0), (1000, 0), arrive_s=reached_s(1000)), a_part(2, (0, 300), (1000, 300))]
     weather = Weather(5.0, None, 1.0, 1.0)

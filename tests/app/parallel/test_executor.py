@@ -181,7 +181,7 @@ def box(north_m: float) -> list[dict[str, float]]:
     return [{"east_m": e, "north_m": north_m + n} for e, n in ((300, -300), (310, -300), (310, 300), (300, 300))]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_processes_give_the_same_results(workers: Executor) -> None:
     assert sorted(workers.each(square, 7, range(40))) == [(k, 7 + k * k) for k in range(40)]
     with pytest.raises(NoMission, match="three"):

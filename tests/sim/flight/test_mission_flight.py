@@ -165,7 +165,7 @@ def test_no_limit_of_motion_is_ever_broken(
     assert np.linalg.norm(points[-1] - goal) < 0.05
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_quarter_of_the_step_flies_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     way = track(
         TAKEOFF, speed(9), at(cmd.WAYPOINT, 0, 200, 60), at(cmd.WAYPOINT, 150, 250, 40), at(cmd.WAYPOINT, 160, 100, 70),
