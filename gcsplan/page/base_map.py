@@ -6,6 +6,7 @@ import re
 import sqlite3
 import threading
 import zlib
+from contextlib import closing
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -51,10 +52,11 @@ class MbtilesFile:
     """An MBTiles file, which is an SQLite database. Raises InputError."""
 
     def __init__(self, file: Path) -> None:
+        self._address = f"{file.absolute().as_uri()}?mode=ro"
         try:
-            self._file = sqlite3.connect(f"{file.absolute().as_uri()}?mode=ro", uri=True, check_same_thread=False)
-            known = {str(k): str(v) for k, v in self._file.execute("SELECT name, value FROM metadata LIMIT 200")}
-            low, high = self._file.execute("SELECT min(zoom_level), max(zoom_level) FROM tiles").fetchone()
+            with closing(sqlite3.connect(self._address, uri=True)) as opened:
+                known = {str(k): str(v) for k, v in opened.execute("SELECT name, value FROM metadata LIMIT 200")}
+                low, high = opened.execute("SELECT min(zoom_level), max(zoom_level) FROM tiles").fetchone()
         except sqlite3.Error as why:
             raise InputError(f"this is no MBTiles file: {why}", where=f"--base {file}") from None
         self.media_type = FORMATS.get(known.get("format", ""), "")
@@ -66,7 +68,8 @@ class MbtilesFile:
         """A tile, counted from the north-west; None if there is none."""
         question = "SELECT tile_data FROM tiles WHERE zoom_level = ? AND tile_column = ? AND tile_row = ? LIMIT 1"
         try:
-            row = self._file.execute(question, (z, x, 2**z - 1 - y)).fetchone()
+            with closing(sqlite3.connect(self._address, uri=True)) as opened:
+                row = opened.execute(question, (z, x, 2**z - 1 - y)).fetchone()
         except (sqlite3.Error, OverflowError):
             return None
         return row[0] if row is not None and isinstance(row[0], bytes) else None

@@ -118,7 +118,8 @@ VALUES: list[Any] = [
     {}, ROUND, DEEP, {1: 2}, {None: 1}, [1, "a", None, {}], ["36.5", "-84.3"], [10**400, 1], {1, 2}, range(3), slice(1),
     ..., NotImplemented, object(), int, len, ValueError("x"), 1j, decimal.Decimal("sNaN"), fractions.Fraction(1, 3),
     datetime.timedelta(1), np.zeros(0), np.full((3, 3), np.nan), np.array([None, object()], object),
-    np.datetime64("NaT"), np.ma.masked, collections.UserDict(a=1), Path("absent"), NoText(), NoList([1]), NoMapping(),
+    np.datetime64("NaT", "s"), np.ma.masked, collections.UserDict(a=1), Path("absent"),
+    NoText(), NoList([1]), NoMapping(),
     NoAttributes(), AllAttributes(), NoPath(), NoShape(None), NoShape(7), NoArray(),
 ]  # fmt: skip
 
