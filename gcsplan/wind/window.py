@@ -26,8 +26,6 @@ _TURNS = 8
 _FINE = 128
 WITNESS_M_S, MOST_SPEEDS, MOST_TURNS = 1.0, 5, 24
 """A cell of `witnesses` spans at most about this, with no more cells of speeds and of directions than these."""
-WITNESS_M_S, MOST_SPEEDS, MOST_TURNS = 1.0, 5, 24
-"""A cell of `witnesses` spans at most about this, with no more cells of speeds and of directions than these."""
 CELL_GROUPS = 16
 """Groups of neighbouring cells of `witnesses` for which the motion is computed."""
 
