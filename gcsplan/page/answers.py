@@ -134,7 +134,6 @@ def error_answer(n: int, why: GcsplanError, code: str) -> dict[str, Any]:
     """An error in words."""
     problems = why.problems if isinstance(why, InputError) else ()
     where = problems[0].key if problems else ""
-    words = [str(replace(p, where=p.key)) for p in problems[:MOST_ON_PAGE]]
     lines = [  # of text that is no YAML, the line is the whole place
         {
             "line": p.in_line,
@@ -143,8 +142,13 @@ def error_answer(n: int, why: GcsplanError, code: str) -> dict[str, Any]:
         }
         for p in problems[:MOST_ON_PAGE]
     ]
-    message = "\n".join(words) or str(why)
-    return {"type": "error", "n": n, "code": code, "message": message, "where": where, "problems": lines}
+    return {"type": "error", "n": n, "code": code, "message": mistakes_text(why), "where": where, "problems": lines}
+
+
+def mistakes_text(why: GcsplanError) -> str:
+    """The mistakes of the mission, one a line, each with its key; the error's own words where it lists none."""
+    problems = why.problems if isinstance(why, InputError) else ()
+    return "\n".join(str(replace(p, where=p.key)) for p in problems[:MOST_ON_PAGE]) or str(why)
 
 
 def figures(v: VehiclePlan, home: WayHome | None, units: Units) -> list[dict[str, Any]]:

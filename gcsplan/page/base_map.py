@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import sqlite3
-import threading
 import zlib
 from contextlib import closing
 from pathlib import Path
@@ -38,7 +37,7 @@ BASE_FORMS = "an .mbtiles or .pmtiles file, or an address with {z}, {x} and {y}"
 
 
 class TileFile(Protocol):
-    """A file of raster tiles: what it holds, and one of its tiles."""
+    """A file of raster tiles: what it holds, and one of its tiles, for any thread."""
 
     media_type: str
     zooms: tuple[int, int]
@@ -113,7 +112,6 @@ class BaseMap:
     def __init__(self, given: str) -> None:
         self.host = ""
         self._file: TileFile | None = None
-        self._lock = threading.Lock()
         self.media_type = ""
         if "://" in given:
             match = _ADDRESS.fullmatch(given)
@@ -143,6 +141,5 @@ class BaseMap:
         """A tile of the file; None if it has none there."""
         if self._file is None or not (0 <= z <= 30 and 0 <= x < 2**z and 0 <= y < 2**z):
             return None
-        with self._lock:
-            data = self._file.tile(z, x, y)
+        data = self._file.tile(z, x, y)
         return data if data is not None and len(data) <= MOST_BASE_TILE_BYTES else None

@@ -33,7 +33,7 @@ from gcsplan.mission_file.window import opened
 from gcsplan.mission_file.zone_reader import read_zones
 from gcsplan.mission_file.zones.draft import ZoneDraft, zone_notes
 from gcsplan.notes.note import Note, Wording
-from gcsplan.page.answers import MOST_ON_PAGE, PROFILE_SAMPLES, flown_line, profile_of, verdict_word
+from gcsplan.page.answers import MOST_ON_PAGE, PROFILE_SAMPLES, flown_line, mistakes_text, profile_of, verdict_word
 from gcsplan.page.dropped.route import FileRoute, route_of
 from gcsplan.page.dropped.shelf import Dropped, Shelf, has_other, may_be_zones, place_in
 from gcsplan.page.edits import Edits
@@ -135,8 +135,7 @@ class DroppedFile:
         try:
             source = planner.loaded()
         except InputError as why:
-            mistakes = "\n".join(str(replace(p, where=p.key)) for p in why.problems[:MOST_ON_PAGE])
-            return answer | {"error": f"the mission has mistakes, so nothing is checked in it:\n{mistakes}"}
+            return answer | {"error": f"the mission has mistakes, so nothing is checked in it:\n{mistakes_text(why)}"}
         argument = f"{vehicles[number]['name']}={dropped.name}"
         held = {str(split_name(argument)[1]): dropped.data}
         batch = check_batch(source, [argument], held=held, returns=Returns(judged=True))

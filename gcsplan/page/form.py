@@ -10,6 +10,7 @@ import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
+from itertools import product
 from pathlib import Path
 from typing import Any, Literal
 
@@ -275,15 +276,17 @@ def require_own_files(document: EditedDocument, before: EditedDocument, folder: 
 
 def _files_named(document: EditedDocument) -> Iterator[tuple[str, str]]:
     """Each key that names a file, and the name."""
-    places = [("terrain", key) for key in ("dem", "canopy", "geoid_grid")] + [("wind", "forecast")]
-    for zones in ("no_fly", "keep_in"):
-        listed = document.get(zones)
-        places += [(f"{zones}[{k}]", "file") for k in range(len(listed) if isinstance(listed, list) else 0)]
-    for section, key in places:
-        value = _section(document, section).get(key)
-        for name in value if isinstance(value, list) else [value]:
-            if isinstance(name, str):
-                yield f"{section}.{key}", name
+    for section, part in SECTIONS.items():
+        keys = [key for (of, key), why in YAML_ONLY.items() if of == part and why is FILE_NAMED]
+        places = [section]
+        if section.endswith("[]"):
+            listed = document.get(section.removesuffix("[]"))
+            places = [section.replace("[]", f"[{k}]") for k in range(len(listed) if isinstance(listed, list) else 0)]
+        for place, key in product(places, keys):
+            value = _section(document, place).get(key)
+            for name in value if isinstance(value, list) else [value]:
+                if isinstance(name, str):
+                    yield f"{place}.{key}", name
 
 
 def cure_changes(document: EditedDocument, vehicle: str, cure: LimitValues) -> dict[str, float]:

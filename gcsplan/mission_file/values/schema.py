@@ -32,6 +32,9 @@ LEAST_POSITIVE = 1e-3
 
 MOST_VOLTS = 10_000.0
 
+MOST_VIAS = 500
+"""Most vias of a vehicle."""
+
 MOST_DECLARED_M_S = 75.0
 """Fastest wind that a mission may declare: faster than any gust in which an aircraft of these kinds has flown."""
 
@@ -284,7 +287,7 @@ class VehicleKeys(LimitKeys):
     """Top of the vertical take-off, where the path begins; if absent, the lowest legal height."""
     approach_agl_m: Positive | None = None
     """End of the path above the goal; if absent, the lowest legal height."""
-    via: Annotated[list[ViaPoint], Field(max_length=500), BeforeValidator(in_own_brackets)] = []
+    via: Annotated[list[ViaPoint], Field(max_length=MOST_VIAS), BeforeValidator(in_own_brackets)] = []
     """Points to pass, in order: a place, with or without its height above ground."""
     end: Literal["land", "loiter", "rtl", "none"] = "land"
     """What follows the path: a landing, a hold or circle, the autopilot's return, or nothing."""

@@ -17,9 +17,7 @@ from gcsplan.mavlink.mission.commands import (
     is_nav,
 )
 from gcsplan.mavlink.mission.mission import NO_POSITION, Mission
-
-MOST_POINTS = 500
-"""Most vias of a vehicle in a mission file."""
+from gcsplan.mission_file.values.schema import MOST_VIAS
 
 TAKE_OFFS = (TAKEOFF, VTOL_TAKEOFF)
 FINAL_ITEMS = (LAND,)
@@ -60,8 +58,8 @@ def route_of(mission: Mission, where: str) -> FileRoute:
             places.append((item.x, item.y))
     if not places:
         raise InputError("no item flies to a place, so there is no route to plan", where=where)
-    if len(places) - 1 > MOST_POINTS:
-        raise InputError(f"the route passes {len(places) - 1} places, more than {MOST_POINTS}: split it", where=where)
+    if len(places) - 1 > MOST_VIAS:
+        raise InputError(f"the route passes {len(places) - 1} places, more than {MOST_VIAS}: split it", where=where)
     degrees = [(lat / 1e7, lon / 1e7) for lat, lon in places]
     start = None if home.lat_e7 == home.lon_e7 == 0 else (home.lat_e7 / 1e7, home.lon_e7 / 1e7)
     left_out = tuple(name if count == 1 else f"{count} × {name}" for name, count in others.items())

@@ -7,7 +7,8 @@ import pytest
 from gcsplan.errors import InputError
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import NO_POSITION, RELATIVE, Home, Mission, MissionItem
-from gcsplan.page.dropped.route import MOST_POINTS, route_of
+from gcsplan.mission_file.values.schema import MOST_VIAS
+from gcsplan.page.dropped.route import route_of
 from gcsplan.vehicle import Autopilot
 
 HOME = Home(465_000_000, 85_000_000, 100.0)
@@ -47,6 +48,6 @@ def test_a_landing_without_a_place_ends_where_the_last_item_flew_to() -> None:
 def test_a_mission_to_nowhere_or_of_too_many_places_has_no_route() -> None:
     with pytest.raises(InputError, match="no item flies to a place"):
         route_of(mission(MissionItem(cmd.RTL, NO_POSITION)), "a.plan")
-    many = [at(cmd.WAYPOINT, 465_000_000 + 1000 * k, 85_000_000) for k in range(MOST_POINTS + 2)]
-    with pytest.raises(InputError, match=f"more than {MOST_POINTS}"):
+    many = [at(cmd.WAYPOINT, 465_000_000 + 1000 * k, 85_000_000) for k in range(MOST_VIAS + 2)]
+    with pytest.raises(InputError, match=f"more than {MOST_VIAS}"):
         route_of(mission(*many), "a.plan")
