@@ -201,7 +201,8 @@ class Verdict:
     @property
     def drift(self) -> Drift | None:
         """How much earlier or later each leg ends in each declared wind; None in still air, or if it cannot fly."""
-        return None if self.in_wind is None or self.in_wind.too_windy is not None else self.in_wind.drift
+        blown = self.in_wind
+        return None if blown is None or blown.wind.still or blown.too_windy is not None else blown.drift
 
     @property
     def arrival_drift(self) -> Drifts:

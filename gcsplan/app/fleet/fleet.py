@@ -131,7 +131,8 @@ def _schedule_in_wind(flown: Sequence[VehiclePlan], fleet: FleetPlan) -> list[No
     """The note on what the declared winds make of a time table: it holds in each, or nothing was requested of it."""
     placed = sorted(((fleet.slot(v.name), v.verdict) for v in flown), key=lambda one: one[0].arrive_s)
     known = [w for w in (verdict.arrive_window_s(slot) for slot, verdict in placed) if w is not None]
-    if len(known) < 2:
+    blown = [v.verdict.in_wind for v in flown]
+    if len(known) < 2 or all(one is None or one.wind.still for one in blown):  # departures alone make windows, too
         return []
     if fleet.in_every_wind and not any(drifts(v) for v in flown):
         return [Note("schedule_in_every_wind")]

@@ -338,3 +338,11 @@ def test_a_fleet_that_asks_for_no_arrival_is_timed_in_still_air() -> None:
     done = planned(None, {"lean_angle_deg": 30}, {"lean_angle_deg": 30}, wind={"up_to_m_s": 4})
     assert "schedule_in_still_air" in [n.code for n in done.notes]
     assert summary_of(done)["fleet"]["in_every_wind"] is False
+
+
+def test_departures_alone_say_nothing_of_declared_winds() -> None:
+    late = {"depart_window_s": 20}
+    done = planned(sequence(20), late, late)
+    assert all(v.verdict.in_wind is not None for v in done.vehicles)  # which has the windows
+    assert not [n.code for n in done.notes if n.code.startswith("schedule_")]
+    assert not {"in_every_wind", "intervals"} & summary_of(done)["fleet"].keys()
