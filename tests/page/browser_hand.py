@@ -5,10 +5,25 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+import pytest
+
+from tests.support import browser as chromium
 from tests.support.browser import Browser
+
+PROGRAM = chromium.find()
+IN_A_BROWSER = (
+    pytest.mark.xdist_group("map"),
+    pytest.mark.skipif(find_spec("maplibre") is None, reason="the extra map is not installed"),
+    pytest.mark.skipif(
+        PROGRAM is None,
+        reason=f"no browser: none of {', '.join(chromium.NAMES)} is installed (GCSPLAN_CHROMIUM names one)",
+    ),
+)
+"""Marks of tests that look at the page."""
 
 PATIENCE_S = 90.0
 CODES = {

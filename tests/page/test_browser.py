@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -20,30 +19,13 @@ from gcsplan.app.session import Planner
 from gcsplan.cli.command_table import app
 from gcsplan.page.server import MapServer
 from tests.page.browser_drag import dragged, table
-from tests.page.browser_hand import Hand
+from tests.page.browser_hand import IN_A_BROWSER, Hand
 from tests.page.talk import FLAT, eventually, serving
-from tests.support import browser as chromium
 from tests.support.browser import Browser
 
-PROGRAM = chromium.find()
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.xdist_group("map"),
-    pytest.mark.skipif(find_spec("maplibre") is None, reason="the extra map is not installed"),
-    pytest.mark.skipif(
-        PROGRAM is None,
-        reason=f"no browser: none of {', '.join(chromium.NAMES)} is installed (GCSPLAN_CHROMIUM names one)",
-    ),
-]
+pytestmark = [pytest.mark.slow, *IN_A_BROWSER]
 ON_MAP = "#map-frame canvas"
 GOAL, START = "#grip-0-goal", "#grip-0-start"
-
-
-@pytest.fixture(scope="module")
-def page(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    assert PROGRAM is not None
-    with chromium.browser(PROGRAM, tmp_path_factory.mktemp("home")) as made:
-        yield made
 
 
 @pytest.fixture

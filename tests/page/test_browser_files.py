@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
-from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -14,22 +12,11 @@ pytest.importorskip("uvicorn", reason="the extra map is not installed")
 pytest.importorskip("websockets", reason="the extra map is not installed")
 
 from gcsplan.app.fleet.pipeline import load_mission, plan
-from tests.page.browser_hand import Hand
+from tests.page.browser_hand import IN_A_BROWSER, Hand
 from tests.page.talk import FLAT, eventually, serving
-from tests.support import browser as chromium
 from tests.support.browser import Browser
 
-PROGRAM = chromium.find()
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.nightly,
-    pytest.mark.xdist_group("map"),
-    pytest.mark.skipif(find_spec("maplibre") is None, reason="the extra map is not installed"),
-    pytest.mark.skipif(
-        PROGRAM is None,
-        reason=f"no browser: none of {', '.join(chromium.NAMES)} is installed (GCSPLAN_CHROMIUM names one)",
-    ),
-]
+pytestmark = [pytest.mark.slow, pytest.mark.nightly, *IN_A_BROWSER]
 HILLS = """\
 version: 1
 terrain: {dem: sample:jacksboro, vertical_datum: EGM96}
@@ -55,13 +42,6 @@ def plan_file() -> str:
     return json.dumps(
         {"fileType": "Plan", "version": 1, "groundStation": "QGroundControl", "mission": mission, **empty}
     )
-
-
-@pytest.fixture(scope="module")
-def page(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    assert PROGRAM is not None
-    with chromium.browser(PROGRAM, tmp_path_factory.mktemp("home")) as made:
-        yield made
 
 
 def opened(page: Browser, url: str, *, width: int = 1200, dark: bool = False) -> Hand:

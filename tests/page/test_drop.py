@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,7 @@ import rasterio
 
 from gcsplan.app.check.files import check_batch, finding_lines
 from gcsplan.app.fleet.pipeline import load_mission
-from tests.page.test_map_session import FLAT, Desk, desk_of
+from tests.page.desk import FLAT, Desk, desk_of
 
 ROWS = [(16, 46.5, 8.5, 100), (22, 46.5, 8.5, 40), (16, 46.505, 8.52, 40), (16, 46.51, 8.51, 20), (21, 46.51, 8.51, 0)]
 WAYPOINTS = "QGC WPL 110\n" + "".join(
@@ -29,18 +28,6 @@ ZONES: dict[str, Any] = {
             "type": "LineString", "coordinates": [[8.54, 46.5], [8.55, 46.5]]}},
     ],
 }  # fmt: skip
-
-
-@pytest.fixture
-def file(tmp_path: Path) -> Path:
-    (tmp_path / "field.yaml").write_text(FLAT)
-    return tmp_path / "field.yaml"
-
-
-@pytest.fixture
-def desk(file: Path) -> Iterator[Desk]:
-    with desk_of(file, file.parent) as desk:
-        yield desk
 
 
 def drop(desk: Desk, name: str, data: bytes, **more: Any) -> dict[str, Any]:

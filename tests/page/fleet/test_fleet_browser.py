@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -17,31 +15,16 @@ pytest.importorskip("websockets", reason="the extra map is not installed")
 from gcsplan.app.api import write
 from gcsplan.app.session import Planner
 from gcsplan.cli.command_table import app
-from tests.page.browser_hand import Hand
+from tests.page.browser_hand import IN_A_BROWSER, Hand
 from tests.page.talk import FLAT, serving
-from tests.support import browser as chromium
 from tests.support.browser import Browser
 
-PROGRAM = chromium.find()
-pytestmark = [
-    pytest.mark.nightly,
-    pytest.mark.slow,
-    pytest.mark.xdist_group("map"),
-    pytest.mark.skipif(find_spec("maplibre") is None, reason="the extra map is not installed"),
-    pytest.mark.skipif(PROGRAM is None, reason="no browser is installed (GCSPLAN_CHROMIUM names one)"),
-]
+pytestmark = [pytest.mark.nightly, pytest.mark.slow, *IN_A_BROWSER]
 ON_MAP = "#map-frame canvas"
 ENDS = [((-150, 80), (150, -60)), ((-170, 10), (160, 10)), ((-110, 110), (170, 70))]
 """Start and goal of each further vehicle, in pixels from the middle of the map."""
 
 SPOTS = "document.querySelectorAll('#place .crafts .craft').length"
-
-
-@pytest.fixture(scope="module")
-def page(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    assert PROGRAM is not None
-    with chromium.browser(PROGRAM, tmp_path_factory.mktemp("home")) as made:
-        yield made
 
 
 def planned(hand: Hand) -> None:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Iterator
-from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -15,26 +13,12 @@ pytest.importorskip("uvicorn", reason="the extra map is not installed")
 pytest.importorskip("websockets", reason="the extra map is not installed")
 
 from gcsplan.sim.vehicle.misbehaviour import Misbehaviour
-from tests.page.browser_hand import Hand
+from tests.page.browser_hand import IN_A_BROWSER, Hand
 from tests.page.steps.test_flight_steps import field, flying
 from tests.page.talk import Page, get, serving
-from tests.support import browser as chromium
 from tests.support.browser import Browser
 
-PROGRAM = chromium.find()
-pytestmark = [
-    pytest.mark.nightly,
-    pytest.mark.xdist_group("map"),
-    pytest.mark.skipif(find_spec("maplibre") is None, reason="the extra map is not installed"),
-    pytest.mark.skipif(PROGRAM is None, reason=f"no browser: none of {', '.join(chromium.NAMES)} is installed"),
-]
-
-
-@pytest.fixture(scope="module")
-def page(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    assert PROGRAM is not None
-    with chromium.browser(PROGRAM, tmp_path_factory.mktemp("home")) as made:
-        yield made
+pytestmark = [pytest.mark.nightly, *IN_A_BROWSER]
 
 
 def at_rest(hand: Hand) -> None:
