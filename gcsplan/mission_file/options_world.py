@@ -29,6 +29,7 @@ from gcsplan.mission_file.published.unused import (
 )
 from gcsplan.mission_file.scene import make_spec, settle_areas, settle_zones
 from gcsplan.mission_file.values.errors import read_section
+from gcsplan.mission_file.values.keys import FiniteMetres, Keys
 from gcsplan.mission_file.values.schema import LimitKeys, TerrainKeys, VehicleKeys, WindKeys
 from gcsplan.mission_file.vehicles import make_vehicle
 from gcsplan.mission_file.winds.declaration import NEEDS_DEPARTURE, go_together, winds_of, winds_of_forecast
@@ -68,6 +69,12 @@ KEY_OPTIONS = {
     "height_unit": "--height-unit", "nodata": "--nodata", "on_bad": "--on-bad", "ignore": "--ignore",
 }  # fmt: skip
 """The option for each key of a mission file."""
+
+
+class _ReturnKeys(Keys):
+    """The return of every file; 0 and less are altitudes of parameters, too, so a mission's bounds are not these."""
+
+    rtl_rel_home_m: FiniteMetres | None = None
 
 
 @dataclass(frozen=True)
@@ -126,6 +133,7 @@ class OpenWorld:
             except InputError as why:
                 problems += why.problems
         self._limits = read_section(LimitKeys, dict(options.limits), "", problems) or LimitKeys()
+        read_section(_ReturnKeys, {"rtl_rel_home_m": options.rtl_rel_home_m}, "", problems)
         if not problems:
             self.vehicle("file", "arducopter")  # finds contradictions in the limits before any file is opened
         windy: list[Mistake] = []

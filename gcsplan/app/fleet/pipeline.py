@@ -23,6 +23,7 @@ from gcsplan.app.plan.left_out import LeavingOut
 from gcsplan.app.plan.model import Brief, Plan, PlanOptions, VehiclePlan
 from gcsplan.errors import InputError, NoMission, elements, unknown_name, wrong_argument
 from gcsplan.mission_file import MissionFile, load_mission
+from gcsplan.mission_file.values.schema import MOST_SEED
 from gcsplan.planners.problem import UNIT_OF, Problem, Progress, Solution
 from gcsplan.planners.registry import VOLUME_KEYS, AddedEntry
 from gcsplan.planners.registry import get as get_planner
@@ -134,6 +135,8 @@ def _brief_of(source: MissionFile, given: PlanOptions) -> Brief:
     if entry.warm_starts:
         _require_warm_start(source, merged)
     number = source.planner.seed if given.seed is None else given.seed
+    if not 0 <= number <= MOST_SEED:
+        raise wrong_argument("plan()", "seed", number, f"a whole number from 0 to {MOST_SEED}")
     return Brief(
         source, world_of(source), name, goal, number, merged, len(source.vehicles) > 1 and entry.by_priority(merged),
         own,

@@ -114,7 +114,7 @@ ObjectiveOption = Annotated[
         help="length, energy or time.",
     ),
 ]
-SeedOption = Annotated[int | None, typer.Option("--seed", metavar="N", help="Seed of everything random.")]
+SeedOption = Annotated[int | None, typer.Option("--seed", metavar="N", min=0, help="Seed of everything random.")]
 JobsOption = Annotated[
     int | None,
     typer.Option(

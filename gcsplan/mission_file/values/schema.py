@@ -46,6 +46,7 @@ def _no_trifle(value: float) -> float:
 
 
 Points = Annotated[list[Point], BeforeValidator(in_own_brackets)]
+MOST_SEED = 2**32 - 1
 Positive = Annotated[float, Field(gt=0.0, le=LARGEST_KEY_M)]
 Angle = Annotated[float, Field(gt=0.0, le=90.0)]
 Speed = Annotated[float, Field(gt=0.0, le=300.0), AfterValidator(_no_trifle)]
@@ -419,7 +420,7 @@ class PlannerKeys(Keys):
     """One of the [planners](planners.md)."""
     objective: Literal["length", "energy", "time"] = "length"
     """The quantity to minimise."""
-    seed: Annotated[int, Field(ge=0, le=2**32 - 1)] = 1
+    seed: Annotated[int, Field(ge=0, le=MOST_SEED)] = 1
     """Seed of all random numbers."""
     gap_percent: Annotated[float, Field(ge=0.0, le=100.0)] = 0.1
     """Planning stops when path and bound are this near to each other."""

@@ -388,6 +388,13 @@ def test_the_way_home_is_judged_where_that_is_asked_for(run: Any, folder: Path, 
     assert "way_home" in json.loads(out)["error"]["message"]
 
 
+@pytest.mark.parametrize("altitude", ["nan", "inf", "-inf", "1e300"])
+def test_a_return_altitude_that_is_none_is_refused_not_safe(run: Any, world: list[str], altitude: str) -> None:
+    code, out, err = run("round.waypoints", *world, "--rtl-altitude", altitude, "--require-way-home", "-q")
+    assert (code, out) == (2, "")
+    assert "--rtl-altitude: must be " in err
+
+
 def said_and_data(value: Any) -> Iterator[tuple[str, dict[str, Any]]]:
     """Every sentence of a document that has its data beside it, with them."""
     if isinstance(value, dict):

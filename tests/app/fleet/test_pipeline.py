@@ -10,7 +10,7 @@ import yaml
 from gcsplan.app.fleet.may_fly import require_passing
 from gcsplan.app.fleet.pipeline import plan
 from gcsplan.app.plan.model import Plan
-from gcsplan.errors import CheckFailed, NoMission
+from gcsplan.errors import CheckFailed, NoMission, UsageError
 from gcsplan.mission_file import load_mission
 from tests.support.noted import saying
 from tests.support.paths import DATA
@@ -28,6 +28,12 @@ def planned(vehicle: dict[str, Any] | None = None, limits: dict[str, Any] | None
 
 def commands(of: Plan) -> list[int]:
     return [item.command for item in of.vehicles[0].mission.items]
+
+
+@pytest.mark.parametrize("seed", [-1, 2**32])
+def test_a_seed_that_no_mission_file_may_have_is_refused(seed: int) -> None:
+    with pytest.raises(UsageError, match="seed is a whole number from 0 to 4294967295"):
+        plan(load_mission(DATA / "crossing.yaml"), seed=seed)
 
 
 OVER_A_ZONE: dict[str, Any] = {

@@ -157,6 +157,12 @@ def test_a_wind_beside_a_declared_one_is_refused() -> None:
         Weather(3.0, declared=declared((2.0, 6.0), (0.0, 360.0)))
 
 
+def test_weather_whose_squares_overflow_is_refused() -> None:
+    for numbers in ({"wind_m_s": 1e300}, {"gusts_m_s": 1e6}, {"noise_m": 1e300}, {"noise_m": np.nan}):
+        with pytest.raises(InputError, match="from 0 to 100000"):
+            Weather(**numbers)
+
+
 def test_still_air_that_is_declared_is_calm() -> None:
     assert Weather(declared=declared((0.0, 0.0), (0.0, 360.0))).calm
     assert not Weather(declared=declared((0.0, 0.0), (0.0, 360.0), gust_m_s=2.0)).calm
