@@ -255,7 +255,7 @@ class Edits:
     def begin(self, message: Mapping[str, Any]) -> None:
         """Begin a new mission, as the page's ``new`` says. Raises PageError, InputError."""
         preset = message.get("preset")
-        if preset not in PRESETS:
+        if not isinstance(preset, str) or preset not in PRESETS:
             raise PageError(f"preset is one of {', '.join(PRESETS)}", code="bad_message", where="preset")
         folder = self.store.folder
         dem, flat_m, datum = _ground(message.get("terrain"), folder)

@@ -263,9 +263,10 @@ class MapSession:
             self._zones, self._tiles_of = KeptWorld(), None  # a file may have been replaced
             self._unkept = True
         elif kind == "units":
-            if message.get("units") not in SYSTEMS:
+            name = message.get("units")
+            if not isinstance(name, str) or name not in SYSTEMS:
                 raise PageError(f"units are {', '.join(SYSTEMS)}", code="bad_message", where="units")
-            self._units = SYSTEMS[message["units"]]
+            self._units = SYSTEMS[name]
         elif kind in ("new", "undo", "redo", "cancel", "reload"):
             if kind == "new":
                 edits.begin(message)

@@ -319,7 +319,9 @@ def test_units_change_the_words_and_not_the_numbers(desk: Desk) -> None:
     feet = desk.ask("units", "plan", units="aviation")["vehicles"][0]
     assert feet["length_m"] == metric["length_m"]
     assert " ft" in next(f["text"] for f in feet["figures"] if f["key"] == "least_agl")
-    assert desk.ask("units", "error", units="cubits")["code"] == "bad_message"
+    for no_name in ("cubits", ["metric"], {"metric": 1}, None):
+        assert desk.ask("units", "error", units=no_name)["code"] == "bad_message"
+        assert desk.ask("new", "error", terrain={"flat_m": 1}, preset=no_name)["code"] == "bad_message"
 
 
 def test_a_broken_mission_file_is_an_error_of_the_command(tmp_path: Path) -> None:
