@@ -213,7 +213,18 @@ def explained(error: Exception) -> GcsplanError:
         if isinstance(cause, KeyboardInterrupt):  # compiled code turns Ctrl-C into another error
             return interrupted()
         cause = cause.__cause__ or cause.__context__
+    if isinstance(error, FileNotFoundError) and _folder_is_gone():
+        return InputError("the current folder was removed: change into one that exists")
     return GcsplanError(f"internal error, a bug in gcsplan: {type(error).__name__}: {error} (--debug shows where)")
+
+
+def _folder_is_gone() -> bool:
+    """Whether the folder that relative paths begin at is no longer there; Linux still lists and describes it."""
+    try:
+        os.getcwd()
+    except FileNotFoundError:
+        return True
+    return False
 
 
 def printable(text: str) -> str:

@@ -90,3 +90,14 @@ def test_no_memory_is_an_error_that_can_be_cured(run: Run, monkeypatch: pytest.M
     code, _, err = run("plan", "m.yaml")
     assert code == 2
     assert "not enough memory" in err
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a folder that is in use cannot be removed")
+def test_a_current_folder_that_was_removed_is_named(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    gone = tmp_path / "gone"
+    gone.mkdir()
+    monkeypatch.chdir(gone)
+    gone.rmdir()
+    code, _, err = run("verify", "x.plan", "--to", "udpout:127.0.0.1:9")
+    assert code == 2
+    assert "the current folder was removed" in err
