@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -23,6 +24,31 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_a_folder_gives_the_files_of_the_wanted_endings_however_deep_they_lie(folder: Path) -> None:
     names = [file.relative_to(folder).as_posix() for file in named_files(str(folder), (".plan",))]
     assert names == ["a.plan", "b.plan", "deep/c.plan"]
+
+
+def test_nothing_of_a_folder_is_passed_by_silently(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
+    elsewhere = tmp_path_factory.mktemp("elsewhere")
+    (elsewhere / "d.plan").write_text("")
+    (elsewhere / "round").symlink_to(folder)
+    (folder / "LOUD.PLAN").write_text("")
+    (folder / "broken.plan").symlink_to("nowhere")
+    (folder / "deep" / "linked").symlink_to(elsewhere)
+    names = [file.relative_to(folder).as_posix() for file in named_files(str(folder), (".plan",))]
+    assert sorted(names) == ["LOUD.PLAN", "a.plan", "b.plan", "broken.plan", "deep/c.plan", "deep/linked/d.plan"]
+    assert [file.name for file in named_files("br*", ())] == ["broken.plan"]
+
+
+def test_a_folder_that_cannot_be_read_is_an_error(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    scan = os.scandir
+
+    def closed(path: str) -> object:
+        if str(path).endswith("deep"):
+            raise PermissionError(13, "Permission denied", path)
+        return scan(path)
+
+    monkeypatch.setattr(os, "scandir", closed)
+    with pytest.raises(InputError, match="Permission denied"):
+        named_files(str(folder), (".plan",))
 
 
 def test_a_pattern_gives_what_it_matches_whatever_its_ending(folder: Path) -> None:
