@@ -36,6 +36,9 @@ LONGEST_STEP_S = 6.0 * 3600.0
 SPEED_UNITS = {"m/s": METRE_PER_SECOND, "km/h": KM_PER_HOUR, "kn": KNOT, "mp/h": MILE_PER_HOUR}
 """The units of speed that the API has, by its own names."""
 
+DEGREES = "°"
+"""The unit of directions; 6 is another wind in radians."""
+
 GUSTS_AGL_M = 10.0
 """The height of a forecast's gusts."""
 
@@ -147,7 +150,7 @@ def read_forecast(path: Path, where: str) -> Forecast:
         raise InputError(f"has no speed at any hour; {ASK}", where=at)
     names = [name for name, is_known in zip(names, known, strict=True) if is_known]
     speed = [_speed(hourly, units, f"wind_speed_{name}m", len(times_s), at) for name in names]
-    turned = [_direction(hourly, f"wind_direction_{name}m", len(times_s), at) for name in names]
+    turned = [_direction(hourly, units, f"wind_direction_{name}m", len(times_s), at) for name in names]
     gusts = None if hourly.get("wind_gusts_10m") is None else _speed(hourly, units, "wind_gusts_10m", len(times_s), at)
     gusts = None if gusts is None or np.isnan(gusts).all() else gusts
     heights = agl_m[np.array(known)]
@@ -237,8 +240,10 @@ def _speed(hourly: dict[str, Any], units: dict[str, Any], name: str, count: int,
     return speeds
 
 
-def _direction(hourly: dict[str, Any], name: str, count: int, at: str) -> Floats:
+def _direction(hourly: dict[str, Any], units: dict[str, Any], name: str, count: int, at: str) -> Floats:
     """(T,) directions that the wind comes from, degrees."""
+    if units.get(name) != DEGREES:
+        raise InputError(f"must be {DEGREES}, given {shown(units.get(name))}", where=f"{at}: hourly_units.{name}")
     turned = _column(hourly, name, count, at)
     _require_between(turned, 360.0, f"{at}: hourly.{name}", "°")
     return turned

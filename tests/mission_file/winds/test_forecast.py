@@ -112,6 +112,10 @@ def test_missing_hours_are_refused(tmp_path: Path) -> None:
         ({"hourly__wind_speed_10m": [9999.0] * 6}, r"wind_speed_10m\[0\]: must be 0 to 75 m/s, given 2777.5 m/s"),
         ({"hourly__wind_direction_10m": [361] * 6}, r"wind_direction_10m\[0\]: must be 0 to 360"),
         ({"hourly_units__wind_speed_10m": "Bft"}, "hourly_units.wind_speed_10m: must be one of m/s, km/h, kn, mp/h"),
+        (
+            {"hourly_units__wind_direction_80m": "rad"},
+            "hourly_units.wind_direction_80m: must be °, given the text 'rad'",
+        ),
         ({"hourly_units__wind_gusts_10m": ...}, "hourly_units.wind_gusts_10m: must be one of"),
         ({"hourly__wind_speed_10m": [None] * 6}, "has gusts at 10 m without the wind there"),
         ({"hourly__wind_speed_10m": [None] * 6, "hourly__wind_speed_80m": [None] * 6}, "has no speed at any hour"),
@@ -141,8 +145,8 @@ def test_what_is_no_forecast_is_refused(tmp_path: Path, text: str, words: str) -
 
 
 def test_a_file_that_is_absent_or_a_folder_is_refused(tmp_path: Path) -> None:
-    for path in (tmp_path / "none.json", tmp_path):
-        with pytest.raises(InputError, match="is not there"):
+    for path, words in ((tmp_path / "none.json", "is not there"), (tmp_path, "is no file: give a file, not a folder")):
+        with pytest.raises(InputError, match=words):
             read_forecast(path, "m.yaml: wind.forecast")
 
 
