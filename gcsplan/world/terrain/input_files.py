@@ -146,8 +146,11 @@ def tell_file(path: str | os.PathLike[str]) -> None:
 
 
 def absent(path: Path) -> str:
-    """The words for a file that is not there, with the nearest name in its folder, which is reported, too."""
+    """The words for a file that is not there, with the nearest name in its folder, which is reported, too; or for what
+    has its name and is no file."""
     _tell("near", path)
+    if os.path.exists(path):  # False for names that no disk can hold, where pathlib may raise
+        return f"{path} is no file: give a file, not a {'folder' if os.path.isdir(path) else 'pipe or a device'}"
     near = nearest_name(path)
     hint = f"; did you mean {path.with_name(near)}?" if near else ""
     return f"{path} is not there (paths are relative to the mission file){hint}"
