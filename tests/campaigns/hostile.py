@@ -386,11 +386,13 @@ def odd_options(rng: random.Random) -> list[str]:
     """Odd values of command line options."""
     option = rng.choice(("--min-agl", "--max-agl", "--max-amsl", "--clearance", "--track-error", "--altitude-error",
                          "--max-climb", "--speed", "--climb-rate", "--rtl-altitude", "--obstacle-height", "--home",
-                         "--crs", "--vertical-datum", "--autopilot"))  # fmt: skip
+                         "--crs", "--vertical-datum", "--autopilot", "--wind"))  # fmt: skip
     value = rng.choice(
-        [str(v) for v in ODD if "\x00" not in str(v)] + ["1e-9", "36.6,-84.38", "px4", "EPSG:32616", "EPSG:1"]
+        [str(v) for v in ODD if "\x00" not in str(v)]
+        + ["1e-9", "36.6,-84.38", "px4", "EPSG:32616", "EPSG:1", "5,350-20,9", "up-to:8"]
     )
-    return ["clean/uav1.waypoints", *OPTIONS, option, value]
+    home = rng.choice(([], ["--way-home"], ["--require-way-home"]))
+    return ["clean/uav1.waypoints", *OPTIONS, *home, option, value]
 
 
 KINDS: dict[str, tuple[float, Callable[[random.Random], list[str]]]] = {

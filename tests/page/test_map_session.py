@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import queue
+import random
 import threading
 from pathlib import Path
 from typing import Any
@@ -328,3 +329,28 @@ def test_a_broken_mission_file_is_an_error_of_the_command(tmp_path: Path) -> Non
     (tmp_path / "bad.yaml").write_text("version: [")
     with pytest.raises(InputError):
         Edits.of_file(tmp_path / "bad.yaml")
+
+
+STRANGE: tuple[Any, ...] = (
+    None, True, -1, 0.5, 1e300, 10**30, "", "x", "46.5, 8.5", "\x00", [], [46.5, 8.5], [[46.5, 8.5]], ["a", "b"], {},
+    {"a": 1}, {"flat_m": 100}, {"center": [46.505, 8.503], "radius_m": 30}, {"vehicles[0].start": [46.5, 8.501]},
+    {"no_fly[0]": {"radius_m": "x"}, "vehicles[9]": None}, {"limits.min_agl_m": {}, "wind.speed_m_s": []},
+)  # fmt: skip
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("seed", range(10))
+def test_no_message_of_a_hostile_page_is_a_bug(file: Path, seed: int) -> None:
+    rng = random.Random(seed)
+    needs = {"change": "changes", "new": "preset", "set_text": "text", "save": "name", "look": "to", "write": "fence",
+             "inspect": "settings", "take": "settings", "scene": "on"}  # fmt: skip
+    kinds = (*needs, "units", "vehicle", "section", "undo", "redo", "reload", "cancel", "hello", "upload", "stop")
+    fields = ("terrain", "live", "yaml", "plan", "ticket", "as", "over", "start", "goal", "max_agl_m", "vehicle")
+    with desk_of(file, file.parent) as desk:
+        desk.ask("hello", "plan")
+        for _ in range(80):
+            kind = rng.choice(kinds)
+            more = {rng.choice(fields): rng.choice(STRANGE) for _ in range(rng.randint(0, 2))}
+            desk.send(kind, **more | {needs.get(kind, kind): rng.choice(STRANGE)})
+            desk.ask("place", "place", text="46.5, 8.5")
+    assert [a for a in desk.heard if a.get("code") == "internal"] == []
