@@ -27,8 +27,8 @@ def natural(path: Path) -> list[tuple[str | int, ...]]:
 
 def named_files(text: str, suffixes: Collection[str]) -> list[Path]:
     """The files of a folder, and of those in it, that end in ``suffixes``, in small or capital letters, or of a
-    pattern, in natural order; else ``text``. A link that leads nowhere is one, so that whoever opens it
-    says so.
+    pattern, in natural order; else ``text``. A link that leads nowhere is one, so that whoever
+    opens it says so.
 
     Raises InputError for a pattern that is none, or a folder that cannot be read.
     """
@@ -53,7 +53,8 @@ def _is_file(path: Path) -> bool:
 def _below(folder: Path) -> Iterator[Path]:
     """What lies in a folder and in those below it, also behind links, each folder once. Raises OSError for a folder
     that cannot be read: `Path.rglob` passes it by, and what is not seen would count as judged."""
-    waiting, seen = [folder], set()
+    waiting = [folder]
+    seen: set[tuple[int, int]] = set()
     for top in waiting:  # links come last, so that a folder has its own name where it has one
         for here, inner, names in os.walk(top, onerror=_refuse):
             at = os.stat(here)

@@ -33,7 +33,7 @@ GUST_SIGMAS = 3.0
 LOW_FT, HIGH_FT = 20.0, 1000.0
 """Heights between which MIL-F-8785C lets the turbulence near the ground depend on the height."""
 METRES_PER_FT = 0.3048
-MOST = 1e5
+MOST_WEATHER = 1e5
 """Largest wind and gust, m/s, and position error, m: no weather has these, and squares of larger ones overflow."""
 SLOWEST_M_S = 1.0
 """Turbulence drifts past at least at this speed."""
@@ -46,7 +46,7 @@ class Weather:
     ``gusts_m_s``, ``noise_m``: standard deviation of each component of the gusts and of the position error.
     ``declared``: the set that each run draws its wind from, in place of these winds and gusts; ``start_s``: when the
     first vehicle may leave, seconds UTC since 1970, for a wind that depends on the hour. Raises InputError for a number
-    that is negative, above `MOST` or not finite, and for a wind beside a declared one."""
+    that is negative, above `MOST_WEATHER` or not finite, and for a wind beside a declared one."""
 
     wind_m_s: float = 0.0
     from_deg: float | None = None
@@ -60,8 +60,8 @@ class Weather:
             raise InputError("give a wind with its gusts, or a set of winds to draw from, not both")
         for name in ("wind_m_s", "gusts_m_s", "noise_m"):
             value = getattr(self, name)
-            if not 0.0 <= value <= MOST:
-                raise InputError(f"{name} must be a number from 0 to {MOST:g}, given {float(value):g}")
+            if not 0.0 <= value <= MOST_WEATHER:
+                raise InputError(f"{name} must be a number from 0 to {MOST_WEATHER:g}, given {float(value):g}")
         if self.from_deg is not None and not math.isfinite(self.from_deg):
             raise InputError(f"from_deg must be a direction in degrees, given {self.from_deg:g}")
 

@@ -158,9 +158,9 @@ def test_a_wind_beside_a_declared_one_is_refused() -> None:
 
 
 def test_weather_whose_squares_overflow_is_refused() -> None:
-    for numbers in ({"wind_m_s": 1e300}, {"gusts_m_s": 1e6}, {"noise_m": 1e300}, {"noise_m": np.nan}):
+    for wind_m_s, gusts_m_s, noise_m in ((1e300, 0.0, 0.0), (0.0, 1e6, 0.0), (0.0, 0.0, 1e300), (0.0, 0.0, np.nan)):
         with pytest.raises(InputError, match="from 0 to 100000"):
-            Weather(**numbers)
+            Weather(wind_m_s, None, gusts_m_s, noise_m)
 
 
 def test_still_air_that_is_declared_is_calm() -> None:
