@@ -36,7 +36,7 @@ LONGEST_STEP_S = 6.0 * 3600.0
 SPEED_UNITS = {"m/s": METRE_PER_SECOND, "km/h": KM_PER_HOUR, "kn": KNOT, "mp/h": MILE_PER_HOUR}
 """The units of speed that the API has, by its own names."""
 
-DEGREES = "°"
+DIRECTION_UNIT = "°"
 """The unit of directions; 6 is another wind in radians."""
 
 GUSTS_AGL_M = 10.0
@@ -242,8 +242,10 @@ def _speed(hourly: dict[str, Any], units: dict[str, Any], name: str, count: int,
 
 def _direction(hourly: dict[str, Any], units: dict[str, Any], name: str, count: int, at: str) -> Floats:
     """(T,) directions that the wind comes from, degrees."""
-    if units.get(name) != DEGREES:
-        raise InputError(f"must be {DEGREES}, given {shown(units.get(name))}", where=f"{at}: hourly_units.{name}")
+    if units.get(name) != DIRECTION_UNIT:
+        raise InputError(
+            f"must be {DIRECTION_UNIT}, given {shown(units.get(name))}", where=f"{at}: hourly_units.{name}"
+        )
     turned = _column(hourly, name, count, at)
     _require_between(turned, 360.0, f"{at}: hourly.{name}", "°")
     return turned
