@@ -82,12 +82,14 @@ def leaning_m_s(lean_deg: float | Floats, slope_rad: Floats, amsl_m: Floats) -> 
     thin = density_ratio(amsl_m)
     lean = np.radians(lean_deg)
     tilt = np.clip(lean + slope_rad, None, np.radians(80.0))
+    lift, push, rise, body = np.cos(lean), 2.0 * np.sin(lean), np.tan(tilt), BODY * thin
+    drag = 4.0 * BODY * thin * np.sin(lean)
     thrust = np.ones_like(tilt)
     for _ in range(_LEAN_ROUNDS):
         rotors = ROTORS * np.sqrt(thin * thrust)
-        along = 2.0 * np.sin(lean) / (rotors + np.sqrt(rotors**2 + 4.0 * BODY * thin * np.sin(lean)))
-        across = along * np.tan(tilt)
-        thrust = np.maximum(np.cos(lean) + BODY * thin * across * np.abs(across) + rotors * across, 0.01)
+        along = push / (rotors + np.sqrt(rotors**2 + drag))
+        across = along * rise
+        thrust = np.maximum(lift + body * across * np.abs(across) + rotors * across, 0.01)
     return np.asarray(along / np.cos(tilt))
 
 
