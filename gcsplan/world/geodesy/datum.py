@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -295,6 +296,15 @@ def vertical_datum(given: str | None, raster: VerticalDatum | None, *, where: st
     )
 
 
+@lru_cache(maxsize=32)
+def ways(source: CRS, target: CRS, *, allow_ballpark: bool) -> Transformer:
+    """All ways of PROJ from one system to another, x before y; kept, because it takes milliseconds to find them.
+
+    pyproj makes what is not safe to share once in each thread. Raises ProjError.
+    """
+    return Transformer.from_crs(source, target, always_xy=True, allow_ballpark=allow_ballpark)
+
+
 def plane_to_raster(
     frame: Frame, horizontal: Any, box: tuple[float, float, float, float], *, where: str
 ) -> tuple[Transformer, float]:
@@ -306,7 +316,7 @@ def plane_to_raster(
     """
     middle = (0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3]))
     try:
-        several = Transformer.from_crs(frame.crs, horizontal, always_xy=True, allow_ballpark=False)
+        several = ways(frame.crs, horizontal, allow_ballpark=False)
         x, y = several.transform(*middle)
         if not (np.isfinite(x) and np.isfinite(y)):
             raise ProjError("the mission lies where this coordinate system is not defined")
@@ -330,7 +340,7 @@ def plane_to_raster(
 def to_wgs84(horizontal: Any, *, where: str) -> Transformer:
     """From a raster's coordinates to (longitude, latitude) on WGS84; accurate enough to look up a geoid."""
     try:
-        return Transformer.from_crs(horizontal, CRS.from_epsg(4326), always_xy=True)
+        return ways(horizontal, CRS.from_epsg(4326), allow_ballpark=True)
     except ProjError as why:
         raise InputError(
             f"there is no known way from {horizontal.name!r} to WGS84 ({_first_line(why)}); state the coordinate "

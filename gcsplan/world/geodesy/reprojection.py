@@ -15,7 +15,7 @@ from pyproj.exceptions import ProjError
 from gcsplan.arrays import Floats, Indices
 from gcsplan.errors import InputError
 from gcsplan.notes.note import Note
-from gcsplan.world.geodesy.datum import WORST_SHIFT_M, require_no_grid
+from gcsplan.world.geodesy.datum import WORST_SHIFT_M, require_no_grid, ways
 from gcsplan.world.geodesy.degree_shapes import EDGE_BOW_M, HALF_TURN_DEG, unwrapped
 
 WGS84 = "WGS 84"
@@ -43,7 +43,7 @@ class ToDegrees:
             self.name = str(horizontal.name)
             if horizontal.equals(CRS.from_epsg(4326), ignore_axis_order=True):
                 return
-            several = Transformer.from_crs(horizontal, CRS.from_epsg(4326), always_xy=True, allow_ballpark=False)
+            several = ways(horizontal, CRS.from_epsg(4326), allow_ballpark=False)
             if not all(math.isfinite(x) for x in several.transform(*middle)):
                 raise ProjError("the shapes lie where it is not defined")
             self._operation = _used(several)
