@@ -40,7 +40,7 @@ def a_fence(autopilot: Autopilot) -> Fence:
     return fence
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("autopilot", [COPTER, PX4])
 def test_a_fence_arrives_at_a_mavsdk_vehicle_and_reads_back(
     autopilot: Autopilot, monkeypatch: pytest.MonkeyPatch
@@ -55,6 +55,7 @@ def test_a_fence_arrives_at_a_mavsdk_vehicle_and_reads_back(
     assert len(areas_of(read, FRAME)) == 3
 
 
+@pytest.mark.nightly
 def test_mavsdk_imports_the_fence_of_a_plan(tmp_path: Path) -> None:
     fence = a_fence(PX4)
     mission: Mission = a_mission(PX4, 8)

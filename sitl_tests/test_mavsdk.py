@@ -53,7 +53,7 @@ def wires(rows: list[Row]) -> list[bytes]:
 # ── as a vehicle ──────────────────────────────────────────────────────────────────────────────────────────────────
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("autopilot", [COPTER, PX4])
 def test_every_item_arrives_at_a_mavsdk_vehicle_with_the_same_numbers(autopilot: Autopilot) -> None:
     mission = a_mission(autopilot, 60, sysid=7)
@@ -66,6 +66,7 @@ def test_every_item_arrives_at_a_mavsdk_vehicle_with_the_same_numbers(autopilot:
         assert any("could not be checked" in str(warning) for warning in result.warnings)  # it calls itself generic
 
 
+@pytest.mark.nightly
 @pytest.mark.usefixtures("hasty_requests")
 def test_odd_numbers_arrive_at_a_mavsdk_vehicle_bit_by_bit() -> None:
     odd = (
@@ -135,6 +136,7 @@ def test_mavsdk_takes_our_vehicle_for_one_and_its_missions_survive(autopilot: Au
         )
 
 
+@pytest.mark.nightly
 def test_mavsdk_clears_our_vehicle_and_hears_each_refusal() -> None:
     vehicle = a_vehicle(PX4)
     good = [row_for(n, item, current=int(n == 0)) for n, item in enumerate(a_mission(PX4, 6).items)]
@@ -155,6 +157,7 @@ def imported(autopilot: Autopilot, steps: list[list[Any]]) -> list[Any]:
         return mavsdk_station(server.url_for_gcs, steps)
 
 
+@pytest.mark.nightly
 def test_mavsdk_imports_our_plan_exactly(tmp_path: Path) -> None:
     mission = a_mission(PX4, 50)
     unturned = MissionItem(17, 3, (0.0, 0.0, 25.0, math.nan), 366_000_001, -843_800_001, 70.0)

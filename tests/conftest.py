@@ -25,7 +25,7 @@ RESEARCH = Path(__file__).parent / "research"
 
 def pytest_configure(config: pytest.Config) -> None:
     gc.set_threshold(20_000)  # syntax trees of whole packages live on: to walk them often doubles the time they take
-    gc.disable()  # until all tests are collected: nearly all that rewriting and collecting make lives on, or has no circles
+    gc.disable()  # until all tests are collected: what rewriting and collecting make lives on, or has no circles
     os.environ.pop("GCSPLAN_UNITS", None)  # the suite reads the words of the default
     os.environ["GCSPLAN_CLOCK"] = "off"
     effort.full = config.getoption("markexpr") != effort.QUICK

@@ -61,6 +61,7 @@ def rows(table: str) -> list[list[str]]:
 # -- the reference -----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.nightly
 def test_the_mission_file_s_reference_names_every_key_once_and_says_what_it_is(made: ModuleType) -> None:
     keys = [cells for cells in rows(made.mission_file()) if cells[0] != "key"]
     for kind in kinds_of(schema.Keys):
@@ -86,6 +87,7 @@ def test_units_and_defaults_are_those_of_the_code(made: ModuleType) -> None:
     )
 
 
+@pytest.mark.nightly
 def test_the_command_line_s_reference_names_every_command_and_option(made: ModuleType) -> None:
     import typer.main
 
@@ -234,6 +236,7 @@ def test_names_in_brackets_behind_a_module_stand_in_it(page: Path, paths: list[s
         assert set(re.findall(r"`(\w+)`", within)) <= words, module
 
 
+@pytest.mark.nightly
 def test_the_tutorial_s_mission_is_one(tmp_path: Path) -> None:
     text = (DOCS / "tutorial.md").read_text(encoding="utf-8")
     source, mission, datum = re.findall(r"^```(?:python|yaml)\n(.*?)^```", text, re.MULTILINE | re.DOTALL)[:3]
@@ -270,6 +273,7 @@ def test_what_loads_from_elsewhere_is_seen(made: ModuleType, text: str, foreign:
     assert bool(made.FOREIGN.search(text)) is foreign
 
 
+@pytest.mark.nightly
 def test_the_pictures_show_the_sample_mission_as_it_is_planned_today() -> None:
     (vehicle,) = gcsplan.plan(str(TOP / "missions" / "jacksboro.yaml")).vehicles
     for name in ("report.webp", "map.webp"):
@@ -280,6 +284,7 @@ def test_the_pictures_show_the_sample_mission_as_it_is_planned_today() -> None:
         assert proof.info["Description"].startswith(bound), CURE
 
 
+@pytest.mark.nightly
 def test_the_picture_of_the_proof_tells_walls_room_path_and_gap_with_units() -> None:
     source = load_mission("missions/jacksboro.yaml")
     problem, _ = make_problem(source, source.vehicles[0], world_of(source), "length", 1)

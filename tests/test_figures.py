@@ -90,6 +90,7 @@ def test_a_greatest_value_is_never_shown_better_than_it_is_nor_a_digit_worse(val
         assert float(plain) == pytest.approx(shown, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_the_highest_and_the_steepest_are_the_same_everywhere_and_not_flattered() -> None:
     plan = pipeline.plan(pipeline.load_mission(DATA / "crossing.yaml"))
     (v,) = plan.vehicles
@@ -157,7 +158,7 @@ def run(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], tmp_
     return call
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("arrival", ["", "arrival: {mode: none}", "arrival: {mode: sequence, interval_s: 5}"])
 def test_no_unit_is_told_twice_and_the_separation_is_one_number(run: Any, tmp_path: Path, arrival: str) -> None:
     (tmp_path / "m.yaml").write_text(FLEET + arrival)

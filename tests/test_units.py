@@ -172,7 +172,7 @@ def page_words(page: str) -> str:
     return "\n".join(line for line in words.splitlines() if line.strip())
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @systems
 def test_the_chart_of_separations_names_the_exact_least_distance(units: Units) -> None:
     """The curve's samples may miss it by some centimetres, which feet show."""
@@ -243,6 +243,7 @@ def _flown() -> Any:
     return rehearse(planned()[0])
 
 
+@pytest.mark.nightly
 def test_what_the_numbers_are(capsys: pytest.CaptureFixture[str]) -> None:
     """The default's words, and the energy in every unit."""
     row = plan_rows(METRIC)[0]
@@ -315,7 +316,7 @@ def checked(out: str) -> tuple[list[str], list[tuple[float, float]]]:
     return lines, found
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("units", [IMPERIAL, AVIATION], ids=["imperial", "aviation"])
 @pytest.mark.parametrize("mission", ["m.yaml", "higher.yaml"], ids=["kept", "broken"])
 def test_check_says_the_same_in_every_system(run: Any, units: Units, mission: str) -> None:

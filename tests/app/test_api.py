@@ -175,6 +175,7 @@ def test_a_mapping_that_holds_itself_is_refused() -> None:
         load_mission(loop)
 
 
+@pytest.mark.slow
 def test_a_plan_a_mission_and_a_file_are_judged_alike(cross: Plan, tmp_path: Path) -> None:
     verdicts = gcsplan.check(cross)
     assert {name: v.legs for name, v in verdicts.items()} == {v.name: v.verdict.legs for v in cross.vehicles}
@@ -199,6 +200,7 @@ def test_a_plan_a_mission_and_a_file_are_judged_alike(cross: Plan, tmp_path: Pat
         gcsplan.check(tmp_path / "none.plan", cross, vehicle="west")
 
 
+@pytest.mark.slow
 def test_another_wind_counts_for_a_plan_a_mission_and_a_file(cross: Plan, tmp_path: Path) -> None:
     write(cross, tmp_path)
     wind = {"speed_m_s": 8, "from_deg": 30}
@@ -220,6 +222,7 @@ def lowered(items: tuple[MissionItem, ...]) -> tuple[MissionItem, ...]:
     return tuple(dataclasses.replace(item, z=min(item.z, 5.0)) for item in items)
 
 
+@pytest.mark.slow
 def test_what_is_written_is_what_the_command_line_writes(cross: Plan, tmp_path: Path) -> None:
     (tmp_path / "cross.yaml").write_text(TEXT)
     (tmp_path / "ours").mkdir()
@@ -260,6 +263,7 @@ def test_a_report_is_text_and_is_written_where_that_is_asked_for(cross: Plan, tm
         gcsplan.report(cross, tmp_path / "none" / "page.html", way_home=False)
 
 
+@pytest.mark.slow
 def test_a_plan_is_uploaded_to_one_port_to_a_link_each_and_to_simulated_vehicles(cross: Plan) -> None:
     with SimServer(boards(cross), "udpin:127.0.0.1:0", speedup=10.0) as server:
         done = upload(cross, server.url_for_gcs)

@@ -67,6 +67,7 @@ def test_what_is_unchanged_is_kept(folder: Path, tmp_path: Path) -> None:
     assert ran(folder, out, plan=PlanOptions(objective="energy"))[1] == 1
 
 
+@pytest.mark.slow
 def test_a_mission_that_fails_now_loses_its_old_outputs(folder: Path, tmp_path: Path) -> None:
     """No old mission may be flown by mistake."""
     out = tmp_path / "out"

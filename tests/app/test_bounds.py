@@ -170,6 +170,7 @@ def test_corners_that_are_turned_before_are_moved_where_they_are_cut(autopilot: 
     assert v.problem.limits.track_error_m < 0.2
 
 
+@pytest.mark.slow
 def test_a_via_stays_where_it_is_though_its_corner_is_cut() -> None:
     """A via at the very corner of a zone: its corner is not moved; the mission is planned again, or refused."""
     via = [{"east_m": 500, "north_m": 201}]

@@ -91,6 +91,7 @@ def test_a_slowest_speed_above_what_the_default_allows_is_no_reason_to_refuse() 
     assert done.vehicles[0].request.vehicle.speed_min_m_s == 10.0
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize(("lean_deg", "speed_m_s"), [(45, 15.0), (80, 15.0), (36, 12.0), (10, 10.0 / 3.0)])
 def test_a_lean_angle_of_the_file_bounds_the_speed(lean_deg: float, speed_m_s: float) -> None:
     done = planned(lean_angle_deg=lean_deg)
@@ -140,6 +141,7 @@ def uploaded(done: Plan, parameters: Mapping[str, float]) -> JobResult:
     return result
 
 
+@pytest.mark.slow
 def test_a_vehicle_that_leans_less_than_the_plan_needs_is_refused_and_gets_nothing() -> None:
     done = planned(lean_angle_deg=45)
     refused = uploaded(done, {})

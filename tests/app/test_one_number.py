@@ -56,7 +56,7 @@ def test_there_are_twelve_missions() -> None:
     assert len(CASES) >= 12
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @cases
 def test_the_table_shows_it(case: str) -> None:
     _, done = planned(case)
@@ -81,6 +81,7 @@ def test_the_table_shows_it(case: str) -> None:
         shown_as(row["speed, m/s"], true["speed_m_s"], 2)
 
 
+@pytest.mark.first_quick
 @cases
 def test_json_and_csv_hold_it(case: str) -> None:
     _, done = planned(case)
@@ -112,7 +113,7 @@ def test_json_and_csv_hold_it(case: str) -> None:
             assert min(column("min_agl_on_leg_m")) == floored(true["min_agl_m"], 3)
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @cases
 def test_the_report_shows_it(case: str) -> None:
     _, done = planned(case)
@@ -158,7 +159,7 @@ def agrees(again: Verdict, v: VehiclePlan) -> None:
         assert again.nearest.zone_clearance_m == pytest.approx(first.nearest.zone_clearance_m, abs=WIRE_M)
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @cases
 def test_the_check_of_the_written_file_finds_it(case: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     source, done = planned(case)

@@ -122,6 +122,7 @@ def test_the_papers_energy_is_told_where_it_is_what_is_minimised() -> None:
     assert Note("paper_energy_minimised") in done.notes
 
 
+@pytest.mark.slow
 def test_an_advised_return_altitude_above_max_agl_is_told() -> None:
     raw = mission(ENERGY) | {"no_fly": [{"center": [46.012, 14.012], "radius_m": 200, "ceiling_agl_m": 300}]}
     [home] = homes_of(plan(load_mission(raw))).values()

@@ -86,7 +86,7 @@ RTL = {"end": "rtl", "rtl_rel_home_m": 60}
 # -- silence is no default -------------------------------------------------------------------------------------------
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("vehicle", "parameters", "name", "way_home"),
     [
@@ -220,6 +220,7 @@ def test_a_wing_that_cannot_fly_its_turns_or_its_speed_is_refused(parameters: di
     assert words in refused.message
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize(
     "parameters", [{"RTL_ALT_TYPE": 1}, {"WPNAV_ACCEL": 50}, {"RTL_CLIMB_MIN": 5000}, {"RTL_CONE_SLOPE": 1.0}]
 )
@@ -260,6 +261,7 @@ def test_a_wing_returns_at_its_cruise_airspeed() -> None:
     assert done.vehicles[0].request.vehicle.return_speed_m_s == 20.0
 
 
+@pytest.mark.slow
 def test_a_fleet_keeps_apart_as_its_parameters_make_it_fly() -> None:
     """``a`` returns over the way of ``c``, which comes later: at another speed it is where ``c`` is."""
     crossing = keys(name="c", sysid=2, start=[LAT + 0.01, LON - 0.02], goal=[LAT + 0.01, LON + 0.02],
@@ -287,6 +289,7 @@ def test_a_fleet_keeps_apart_as_its_parameters_make_it_fly() -> None:
 # -- the list --------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_the_list_stands_in_every_output() -> None:
     done = planned(keys(rtl_rel_home_m=60, speed_m_s=[14, 14], lean_angle_deg=50))
     files = outputs_of(done)

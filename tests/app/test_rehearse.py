@@ -160,6 +160,7 @@ def test_links_that_may_lead_to_a_real_aircraft_are_refused(url: str) -> None:
     require_here(["tcp:127.0.0.1:5760", "udpin:localhost:14550"])
 
 
+@pytest.mark.slow
 def test_an_instance_is_given_the_vehicles_own_speeds(planned: Plan) -> None:
     part = parts_of(planned)[0]
     given = parameters_of(part)
@@ -325,6 +326,7 @@ def test_vehicles_without_an_address_and_other_autopilots_are_refused(planned: P
         rehearse_sitl([px4], planned.world, Terms(), {"uav1": "tcp:127.0.0.1:5760"})
 
 
+@pytest.mark.slow
 def test_a_mission_that_did_not_pass_is_not_sent_to_them(planned: Plan, monkeypatch: pytest.MonkeyPatch) -> None:
     part = one(planned)[0]
     bad = replace(part, mission=replace(part.mission, items=part.mission.items[:-1]))

@@ -56,6 +56,7 @@ def test_the_sum_of_the_legs_is_the_arrival_and_the_motions(case: str) -> None:
             assert slot.depart_s + clock[seq] == pytest.approx(until[seq], abs=SAME_S), seq
 
 
+@pytest.mark.first_quick
 @cases
 def test_table_json_csv_and_report_say_the_same_times(case: str) -> None:
     _, done = planned(case)
@@ -92,7 +93,7 @@ def test_table_json_csv_and_report_say_the_same_times(case: str) -> None:
         assert {seq: at for seq, at in in_kml.items() if seq in until} == pytest.approx(until, abs=0.0501)
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @cases
 def test_the_check_of_the_written_file_says_the_same_times(case: str, tmp_path: Path) -> None:
     source, done = planned(case)

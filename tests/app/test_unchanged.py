@@ -46,6 +46,7 @@ def spoil(path: Path, *, same_time: bool) -> None:
     os.utime(path, ns=(before.st_atime_ns, new))
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("kind", CASES)
 def test_every_file_that_a_mission_reads_counts(kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("GCSPLAN_DEM_CACHE", str(tmp_path / "w" / "cache"))
@@ -91,6 +92,7 @@ def test_a_file_that_a_sidecar_names_may_go_while_its_header_is_remembered(tmp_p
     assert without.inputs["dem_sha256"] != with_it.inputs["dem_sha256"]
 
 
+@pytest.mark.slow
 def test_a_sidecar_changes_the_ground_and_its_hash_in_one_process(tmp_path: Path) -> None:
     """Headers are remembered by process, and the hash is what workers compare."""
     case = made(geotiff.__name__, tmp_path)
@@ -107,6 +109,7 @@ def test_a_sidecar_changes_the_ground_and_its_hash_in_one_process(tmp_path: Path
     assert load_mission(case.mission).inputs["dem_sha256"] == alone.inputs["dem_sha256"]
 
 
+@pytest.mark.slow
 def test_a_geopackage_with_half_a_change_is_refused(tmp_path: Path) -> None:
     case = made("geopackage", tmp_path / "w")
     batch = batch_of(case.mission, out=tmp_path / "out")
@@ -152,6 +155,7 @@ OUTPUT_CHANGES: list[Callable[[Path], object]] = [
 ]
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("change", OUTPUT_CHANGES)
 def test_outputs_that_are_not_the_record_s_are_made_anew(two: MissionBatch, change: Callable[[Path], object]) -> None:
     before = {p.name: p.read_bytes() for p in (two.directory / "a").iterdir() if p.is_file()}
@@ -162,6 +166,7 @@ def test_outputs_that_are_not_the_record_s_are_made_anew(two: MissionBatch, chan
     assert two.known()[1] == []
 
 
+@pytest.mark.slow
 def test_a_run_that_is_killed_after_any_step_leaves_no_record_that_holds(
     two: MissionBatch, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -238,6 +243,7 @@ DAMAGE: dict[str, Callable[[MissionBatch], object]] = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_record_with_anything_odd_counts_as_none(two: MissionBatch) -> None:
     whole = _record(two).read_bytes()
     for damage, apply in DAMAGE.items():
@@ -250,6 +256,7 @@ def test_a_record_with_anything_odd_counts_as_none(two: MissionBatch) -> None:
     assert two.known()[1] == []
 
 
+@pytest.mark.slow
 def test_a_mission_whose_files_change_while_it_is_planned_is_no_plan(tmp_path: Path) -> None:
     """So is one that a worker of a cluster planned over other files than this process sees."""
     case = made(geotiff.__name__, tmp_path / "w")
@@ -268,6 +275,7 @@ def test_a_mission_whose_files_change_while_it_is_planned_is_no_plan(tmp_path: P
     assert [r.code for r in ran(batch)] == [0]
 
 
+@pytest.mark.slow
 def test_a_second_batch_in_one_folder_is_refused(two: MissionBatch, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("gcsplan.export.durable.LOCK_WAIT_S", 0.1)
     with locked(two.directory):
@@ -276,6 +284,7 @@ def test_a_second_batch_in_one_folder_is_refused(two: MissionBatch, monkeypatch:
     assert "another gcsplan has been writing here" in str(ended.exception)
 
 
+@pytest.mark.slow
 def test_names_of_the_batch_s_own_files_are_no_missions(tmp_path: Path) -> None:
     given, out = tmp_path / "missions", tmp_path / "out"
     names = ["results.csv", "index.html", "Records", "records/deep", "a", "a/summary.json", "a/previous/b", "a.json/b"]
@@ -292,6 +301,7 @@ def test_names_of_the_batch_s_own_files_are_no_missions(tmp_path: Path) -> None:
         assert (out / "results.csv").is_file()
 
 
+@pytest.mark.slow
 def test_what_cannot_be_written_is_that_mission_s_failure(tmp_path: Path) -> None:
     given, out = tmp_path / "missions", tmp_path / "out"
     given.mkdir()

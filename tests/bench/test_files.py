@@ -35,6 +35,7 @@ def test_a_row_that_is_cut_or_is_no_text_is_passed_over(tmp_path: Path) -> None:
         list(kept_rows(tmp_path))
 
 
+@pytest.mark.nightly
 def test_a_picture_has_the_same_bytes_each_time() -> None:
     def drawn(dpi: float) -> bytes:
         figure = Figure(figsize=(2.0, 1.0))

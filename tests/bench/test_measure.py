@@ -138,6 +138,7 @@ def test_the_rank_test_is_scipys_on_made_runs() -> None:
     assert effect == pytest.approx((3.0 + 3.0 + 0.0 + 2 * 0.5) / 9.0)
 
 
+@pytest.mark.slow
 @given(st.lists(st.floats(0.0, 1.0), min_size=1, max_size=12))
 @settings(max_examples=draws(60))
 def test_holms_correction_lies_between_the_raw_values_and_bonferronis(p: list[float]) -> None:

@@ -95,7 +95,7 @@ FOUND = [
 ]
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize(("family", "seed"), FOUND)
 def test_what_the_campaign_found_once_is_cured(family: str, seed: int) -> None:
     tally = run(FOREVER_S, seed, (family,), worlds=1, most=60)
@@ -140,6 +140,7 @@ def test_unknown_ground_is_unknown_in_the_second_implementation_too() -> None:
     assert np.isnan(heights).tolist() == [True, False, True]
 
 
+@pytest.mark.nightly
 def test_the_worlds_of_a_seed_are_the_same_again_and_load() -> None:
     with tempfile.TemporaryDirectory() as name:
         for family in ("slits", "over", "holes", "wings", "returns"):

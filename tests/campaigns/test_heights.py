@@ -45,6 +45,7 @@ def test_heights_are_read_as_the_files_state_them() -> None:
     assert tally.refused.total() > 1
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize(("planted", "seed"), PLANTED)
 def test_the_campaign_finds_a_planted_error(planted: Load, seed: int) -> None:
     tally = Tally()

@@ -23,7 +23,7 @@ def test_nothing_that_is_called_safe_at_the_limit_is_unsafe() -> None:
 
 
 @pytest.mark.nightly_but("500156-circle", "600078-return", "600111-spline", "600036-wing")
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("seed", "family"),
     [

@@ -22,7 +22,7 @@ NOTHING = {
 }
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", NOTHING)
 def test_a_planted_fault_is_found(fault: str, monkeypatch: pytest.MonkeyPatch) -> None:
     kinds, broken = NOTHING[fault]

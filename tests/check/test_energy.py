@@ -105,6 +105,7 @@ def distance_by_time(times: Floats, points: Floats, begin_s: float, end_s: float
     return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(at, axis=0).T))]), t
 
 
+@pytest.mark.slow
 def test_the_way_home_counts_its_time() -> None:
     least = {}
     for base_w in (0.0, BASE):
@@ -145,6 +146,7 @@ def test_the_least_energy_that_is_proved_is_below_what_the_flight_takes(autopilo
         assert R2 + 0.9 * BASE / 10.0 < per_m <= R2 + BASE / 10.0
 
 
+@pytest.mark.slow
 def test_a_speed_that_the_model_was_not_fitted_to_is_told() -> None:
     for fitted, told in (([9, 10], False), (8.5, False), (7, True), ([13, 15], True)):
         notes = planned(ENERGY | {"fitted_speed_m_s": fitted}).vehicles[0].verdict.notes

@@ -152,6 +152,7 @@ def test_a_return_home_over_a_hill_is_judged_and_its_energy_counted() -> None:
     assert unknown.safe is None
 
 
+@pytest.mark.slow
 def test_terrain_following_is_judged_as_interpolated_with_the_terrain_error() -> None:
     hill = world(lambda e, n: 300 + 200 * np.exp(-((e - 1500) ** 2 + n**2) / 4e5))
     points = [[0.0, 0, 400], [3000, 0, 400]]
@@ -232,6 +233,7 @@ def test_a_way_point_beyond_all_reason_is_a_finding_and_not_a_crash(
         assert "coverage" in {f.kind for f in verdict.findings}
 
 
+@pytest.mark.slow
 def test_terrain_following_is_as_steep_as_its_steepest_metre_not_as_a_chord() -> None:
     # In a twisted cell the ground under a diagonal is a parabola: equally high at both edges, and steep there.
     twisted = world(lambda e, n: 300 + np.where((np.abs(e) < 60) & (np.abs(n) < 60) & (e != n), 30.0, 0.0))
@@ -249,7 +251,7 @@ def test_terrain_following_is_as_steep_as_its_steepest_metre_not_as_a_chord() ->
     assert verdict(steepest + 0.2).safe is True
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("frame", ["relative", "terrain"])
 def test_who_moves_by_what_a_violation_tells_keeps_the_limit(frame: str) -> None:
     rng = np.random.default_rng(17)
@@ -278,6 +280,7 @@ def test_who_moves_by_what_a_violation_tells_keeps_the_limit(frame: str) -> None
         assert less & {"min_agl", "terrain_clearance"}  # and the reported lift is not much too large
 
 
+@pytest.mark.slow
 def test_terrain_following_over_small_cells_is_judged_in_a_fraction_of_a_second() -> None:
     rng = np.random.default_rng(3)
     n = 1801

@@ -121,6 +121,7 @@ def test_a_zone_that_is_passed_beside_is_not_passed_over() -> None:
     assert v.verdict.zone_pass is None
 
 
+@pytest.mark.slow
 def test_a_mission_without_a_greatest_height_says_so() -> None:
     for limits, said in (({}, True), ({"max_agl_m": 400}, False)):
         notes = crossing([], 120.0, **limits).vehicles[0].verdict.notes

@@ -85,6 +85,7 @@ def test_an_uncertain_home_widens_the_error_of_all_altitudes() -> None:
     assert judge(flown(both, 300.0 + 191.5, craft), craft, both).safe is False
 
 
+@pytest.mark.slow
 def test_a_vehicle_that_reads_its_own_terrain_may_fly_lower_by_what_files_differ() -> None:
     low, high = seam(1000.0, 30.0)
     both, craft = world_of(low, high), vehicle()

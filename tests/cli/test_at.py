@@ -115,6 +115,7 @@ def test_the_option_counts_in_place_of_the_key(call: Run) -> None:
     assert call("check", "--list-zones", "zones.json", "--at", "2026-11-25")[1].startswith("0 zones")
 
 
+@pytest.mark.slow
 def test_check_with_options_takes_it_too(call: Run) -> None:
     over(36.6, -84.3)
     for name in ("short", "waits"):
@@ -128,6 +129,7 @@ def test_check_with_options_takes_it_too(call: Run) -> None:
     assert "the hours of zones" in call("check", "waits.waypoints", *world, "--at", TUESDAY, "-q")[1]
 
 
+@pytest.mark.slow
 def test_upload_and_verify_refuse_a_flight_beyond_the_hours(call: Run, url: str) -> None:
     as_it_flies = ("--allow-parameters",)  # the file commands no speed, and WPNAV_SPEED is not the mission's
     code, said = call("upload", "waits.waypoints", "--to", url, "--mission", "dated.yaml")

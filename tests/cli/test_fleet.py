@@ -36,6 +36,7 @@ def boards(**trouble: Any) -> list[LoopbackVehicle]:
     ]  # fmt: skip
 
 
+@pytest.mark.slow
 def test_one_line_plans_uploads_verifies_and_tells_when_to_start_whom(run: Any, tmp_path: Path) -> None:
     with SimServer(boards(), "udpin:127.0.0.1:0", speedup=10.0) as server:
         code, out, err = run("plan", write(tmp_path), "--upload", server.url_for_gcs, "--atomic")
@@ -92,6 +93,7 @@ def test_a_gate_that_cannot_be_is_exit_2(run: Any, tmp_path: Path, time: str) ->
     assert "--gate-utc" in err
 
 
+@pytest.mark.slow
 def test_a_rehearsal_flies_the_fleet_and_ends_with_0_where_all_went_well(run: Any, tmp_path: Path) -> None:
     code, out, err = run("rehearse", write(tmp_path), "--json")
     assert code == 0, err
@@ -101,6 +103,7 @@ def test_a_rehearsal_flies_the_fleet_and_ends_with_0_where_all_went_well(run: An
     assert all(abs(v["error_s"]) < 0.5 for v in told["vehicles"])
 
 
+@pytest.mark.slow
 def test_a_report_and_the_way_home_stand_beside_the_missions(run: Any, tmp_path: Path) -> None:
     code, out, err = run("plan", write(tmp_path), "--report")
     assert code == 0, err

@@ -99,6 +99,7 @@ def test_a_void_of_zeros_is_named_where_it_leaves_no_mission(run: Any, tiles: Pa
     assert run("plan", "w.yaml", "-o", "o", "--nodata", "none")[0] in (0, 3)
 
 
+@pytest.mark.slow
 def test_a_home_over_tiles_that_differ_is_refused_and_not_judged(run: Any, tiles: Path) -> None:
     assert run("plan", mission(tiles, "vertical_datum: EGM96", "b.tif"), "-o", "o")[0] == 0
     code, _, err = run("plan", mission(tiles, "vertical_datum: EGM96", "[b.tif, c.tif]"), "-o", "both")
@@ -155,6 +156,7 @@ def test_dat_files_across_a_degree_line_on_a_slope_put_home_where_it_is(run: Any
     assert run("check", "plain.yaml", "o/uav1.waypoints")[0] == 0
 
 
+@pytest.mark.slow
 def test_dat_files_without_one_height_at_home_are_refused_and_not_judged(run: Any, tmp_path: Path) -> None:
     lat = 35.9998
     for name, ground in (("plain", slope), ("rough", rough)):

@@ -12,6 +12,7 @@ import yaml
 from tests.app.plan.test_left_out import GOOD, SHUT, WEAK, mission
 
 
+@pytest.mark.slow
 def test_the_command_names_them_writes_the_others_and_ends_with_three(run: Any, tmp_path: Path) -> None:
     file = tmp_path / "four.yaml"
     file.write_text(yaml.safe_dump(mission(GOOD[0], SHUT, GOOD[1], WEAK)))

@@ -16,6 +16,7 @@ from gcsplan.sim.vehicle.server import SimServer
 from tests.support.crossing import CROSSING, OUTPUTS, changed, vehicle
 
 
+@pytest.mark.slow
 def test_json_puts_exactly_one_document_on_standard_output(run: Any) -> None:
     code, out, _ = run("plan", CROSSING, "--json", "--upload", "sim")
     document = json.loads(out)
@@ -153,7 +154,7 @@ def test_what_is_piped_is_the_table_and_a_reader_that_goes_away_is_no_bug(run: A
     assert {p.name: p.read_bytes() for p in (tmp_path / "out").iterdir()} == whole
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "code"), [("--help", 0), ("planners", 0), ("plan sample:nope", 2), ("plan sample:nope --json", 2)]
 )

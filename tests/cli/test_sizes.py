@@ -22,6 +22,7 @@ def test_ten_thousand_items_are_judged(run: Any) -> None:
     assert code in (0, 4), json.loads(out)
 
 
+@pytest.mark.nightly
 def test_jumps_that_repeat_each_other_end(run: Any) -> None:
     assert run(*sizes.write("jumps", 60))[0] == 4  # 30,000 rounds to the power of fifteen
 

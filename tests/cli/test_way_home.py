@@ -75,7 +75,7 @@ def planned(run: Any, tmp_path: Path) -> Path:
     return tmp_path / "first" / "uav1.plan"
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_return_that_is_reported_is_a_warning_with_one_headline_in_every_command(
     run: Any, tmp_path: Path, planned: Path, command: str
@@ -150,6 +150,7 @@ def test_who_has_no_safe_return_is_left_out_where_vehicles_may_be(run: Any, tmp_
     assert flyable(tmp_path / "out") == []
 
 
+@pytest.mark.slow
 def test_what_could_not_be_judged_is_refused_where_a_safe_return_is_required(
     run: Any, tmp_path: Path, planned: Path
 ) -> None:
@@ -264,6 +265,7 @@ def test_the_value_that_is_told_to_set_makes_the_return_safe(run: Any, tmp_path:
     assert "within all limits" not in text  # no advice where nothing is wrong
 
 
+@pytest.mark.slow
 def test_unchecked_files_have_no_way_home(run: Any, planned: Path) -> None:
     code, text, _ = run("upload", planned, "--to", "udpout:127.0.0.1:9", "--unchecked", "--require-way-home")
     assert code == 2
@@ -276,6 +278,7 @@ def test_a_word_that_way_home_does_not_know_is_refused(run: Any, tmp_path: Path)
     assert "did you mean required" in text
 
 
+@pytest.mark.slow
 def test_a_quiet_check_prints_the_headline_as_a_warning(run: Any, tmp_path: Path, planned: Path) -> None:
     code, text, _ = run("check", write(tmp_path), planned, "--way-home", "-q")
     [line] = text.splitlines()
@@ -283,6 +286,7 @@ def test_a_quiet_check_prints_the_headline_as_a_warning(run: Any, tmp_path: Path
     assert ": warning: way_home: path safe; no safe return from " in line
 
 
+@pytest.mark.slow
 def test_the_report_of_a_check_has_the_way_home_too(run: Any, tmp_path: Path, planned: Path) -> None:
     assert run("check", write(tmp_path), planned, "--way-home", "--report", "page.html")[0] == 0
     page = (tmp_path / "page.html").read_text()

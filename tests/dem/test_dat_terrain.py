@@ -224,6 +224,7 @@ def test_covers_asks_the_blocks(tmp_path: Path) -> None:
     assert not terrain.covers(38.0, -84.40)
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize(("lat", "lon"), [(35.9998, -84.5), (36.5, -84.0002), (46.9998, 8.5), (36.0002, -84.0002)])
 @pytest.mark.parametrize("rise", [(0.5, 0.0), (0.0, 0.5), (-0.4, 0.4)], ids=["north", "east", "aslant"])
 def test_a_plane_over_a_degree_line_has_one_height(

@@ -246,6 +246,7 @@ def test_a_large_fleets_way_points_are_there_to_tick_and_its_tracks_lack_curtain
     assert not list(whole.iter(f"{KML}visibility"))
 
 
+@pytest.mark.slow
 def test_a_hundred_vehicles_make_a_file_that_viewers_open() -> None:
     points = tuple(WayPoint(f"{n} NAV_WAYPOINT", n, "NAV_WAYPOINT", 60.0, None, 10.0 * n) for n in range(50))
     places = np.linspace(36.6, 36.7, 50)

@@ -159,7 +159,7 @@ def heed_signals() -> None:
         signal.signal(number, signal.SIG_DFL)
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @posix
 @pytest.mark.parametrize(("number", "code"), [("SIGTERM", 143), ("SIGHUP", 129), ("SIGINT", 130)])
 def test_a_signal_ends_a_command_with_a_message_and_its_code(tmp_path: Path, number: str, code: int) -> None:
@@ -211,7 +211,7 @@ sys.exit(0)
 """
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @posix
 @pytest.mark.parametrize("fatal", [1, 3, 6, 9])
 def test_sigterm_between_the_moves_takes_them_back(tmp_path: Path, fatal: int) -> None:
@@ -245,6 +245,7 @@ def run(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], tmp_
     return call
 
 
+@pytest.mark.nightly
 def test_no_command_takes_files_from_a_directory_between_two_plans(run: Any, tmp_path: Path) -> None:
     assert run("plan", "m.yaml", "-o", "out")[0] == 0
     shutil.copy("uav1.waypoints", "out/mine.waypoints")
@@ -267,6 +268,7 @@ def test_no_command_takes_files_from_a_directory_between_two_plans(run: Any, tmp
     assert not (tmp_path / "out" / STAGE).exists()
 
 
+@pytest.mark.nightly
 def test_a_file_that_no_manifest_names_or_that_was_edited_is_checked_as_anybodys(run: Any, tmp_path: Path) -> None:
     assert run("plan", "m.yaml", "-o", ".")[0] == 0
     plan = (tmp_path / "uav1.plan").read_text()
@@ -401,7 +403,7 @@ for action in (
 """
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @as_root
 @pytest.mark.parametrize("mode", [0o755, 0o700, 0o1777])
 @pytest.mark.parametrize("state", ["whole", "caught", "half"])

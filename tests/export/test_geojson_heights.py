@@ -65,11 +65,12 @@ def test_ellipsoidal_heights_stand_beside_amsl_where_a_geoid_is_known(folder: Pa
     assert ("number" in home) == ("command" in home) == (autopilot == "arducopter")  # px4 has no item for it
 
 
+@pytest.mark.slow
 def test_without_a_geoid_there_is_no_ellipsoidal_height() -> None:
     assert not any("ellipsoidal_m" in point["properties"] for point in waypoints(DATA / "crossing.yaml"))
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("mission", [DATA / "crossing.yaml", MISSIONS / "jacksboro-wing.yaml"])
 def test_an_item_is_one_way_point_with_the_figures_of_the_profile(mission: Path) -> None:
     plan = pipeline.plan(load_mission(mission))

@@ -51,6 +51,7 @@ def test_the_document_of_a_plan_is_valid_and_a_broken_one_is_not() -> None:
     assert faults("plan", wrong)
 
 
+@pytest.mark.slow
 def test_an_unknown_form_is_refused_with_those_that_there_are() -> None:
     found = CliRunner().invoke(app, ["schema", "plans"])
     assert found.exit_code != 0

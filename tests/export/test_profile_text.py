@@ -25,6 +25,7 @@ def flown() -> tuple[Verdict, World]:
     return vehicle.verdict, World(mission.frame, vehicle.problem.airspace)
 
 
+@pytest.mark.slow
 def test_each_column_has_its_ground_filled_and_the_path_drawn(flown: tuple[Verdict, World]) -> None:
     verdict, world = flown
     *rows, foot = profile_lines(verdict, world, columns=40, rows=12)

@@ -315,6 +315,7 @@ def test_a_refusal_survives_another_process() -> None:
     )  # fmt: skip
 
 
+@pytest.mark.slow
 @settings(max_examples=draws(40))
 @given(
     st.lists(st.floats(100, 2000), min_size=2, max_size=6), st.sampled_from(["ground", "gate", "none"]),

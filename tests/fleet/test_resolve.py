@@ -201,6 +201,7 @@ def test_where_the_clock_leaves_no_room_all_arrive_later_by_the_same() -> None:
         resolve(plan, crews, RULES, later_s=0.0)
 
 
+@pytest.mark.slow
 def test_one_that_nothing_helps_goes_before_the_one_in_its_way() -> None:
     # b can neither wait nor slow down; a can do both, is first in order, and would be where b is.
     stiff = crew("b", (345, -500), (345, 500), slowest=15.0, autopilot=Autopilot.ARDUPLANE)
@@ -226,6 +227,7 @@ def stuck() -> tuple[Schedule, list[Crew]]:
     return schedule([a, b], "none"), [a, b]
 
 
+@pytest.mark.slow
 def test_another_path_is_asked_for_with_what_to_avoid_until_one_does() -> None:
     plan, crews = stuck()
     asked: list[tuple[str, tuple[Conflict, ...], int]] = []

@@ -67,6 +67,7 @@ def sampled(a: TimedPath, b: TimedPath, until_s: float) -> tuple[float, float]:
     return float(np.linalg.norm(a.at(t) - b.at(t), axis=1).min()), fastest * SAMPLE_S
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seeds", FLEETS, ids=lambda seeds: f"{len(seeds)}")
 def test_the_least_distance_is_that_of_a_thousand_sampled_fleets_and_never_more(seeds: range) -> None:
     pairs = 0
@@ -163,6 +164,7 @@ def test_with_a_window_the_least_distance_is_that_over_all_shifts() -> None:
     assert met > draws(45) * 2 / 3
 
 
+@pytest.mark.slow
 @settings(max_examples=draws(40))
 @given(st.integers(0, 2**32 - 1), st.floats(0.01, 3.0))
 def test_a_wider_window_never_shows_more_distance(seed: int, window_s: float) -> None:
@@ -173,6 +175,7 @@ def test_a_wider_window_never_shows_more_distance(seed: int, window_s: float) ->
     assert (narrow <= separation(fleet, Rules(10.0)).distance_m + 1e-6).all()
 
 
+@pytest.mark.slow
 @pytest.mark.draws
 def test_every_shift_within_the_window_keeps_at_least_what_was_told() -> None:
     for seed in range(draws(40)):
@@ -372,6 +375,7 @@ def test_a_fleet_spread_over_a_day_is_cut_where_it_flies() -> None:
     assert found.distance_m[0, 8] == math.inf
 
 
+@pytest.mark.slow
 def test_of_a_hundred_vehicles_few_pieces_are_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
     fleet = large_fleet(100, 300, 5000.0)
     looked = [0]

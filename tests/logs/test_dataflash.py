@@ -84,6 +84,7 @@ def test_a_column_that_a_log_lacks_is_named(
         read_dataflash(dataflash(tmp_path / "old.bin", old_rows()[:100]))
 
 
+@pytest.mark.nightly
 def test_an_old_log_s_hundredths_are_read_by_its_own_format(tmp_path: Path) -> None:
     t, place, watts = flown(seed=26)
     lat, lon = degrees(place)

@@ -31,6 +31,7 @@ def test_a_flights_coefficients_are_found_within_2_percent_at_5_percent_noise(se
         assert 0.0 < c.half_95 < 0.05 * true
 
 
+@pytest.mark.nightly
 def test_intervals_hold_the_truth_about_as_often_as_they_say() -> None:
     held = 0
     for seed in range(40):

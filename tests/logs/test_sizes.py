@@ -31,6 +31,7 @@ def test_a_log_is_refused_by_its_size_before_it_is_read(name: str, tmp_path: Pat
     assert "has more than 256 MB; cut it to the flight" in refused(tmp_path / name)
 
 
+@pytest.mark.nightly
 def test_readings_of_an_ardupilot_log_are_counted_before_they_are_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -43,6 +44,7 @@ def test_readings_of_an_ardupilot_log_are_counted_before_they_are_read(
     assert "readings of place, battery and wind; cut it to the flight" in refused(file)
 
 
+@pytest.mark.nightly
 def test_records_of_an_ardupilot_log_are_counted_before_they_are_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -65,6 +67,7 @@ def test_readings_are_counted_as_they_come(tmp_path: Path, monkeypatch: pytest.M
     assert "holds more than 500 readings" in refused(file)
 
 
+@pytest.mark.nightly
 def test_messages_of_a_ground_station_s_log_are_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file = flights.tlog(tmp_path / "log.tlog")
     monkeypatch.setattr(tlog, "MOST_MESSAGES", 500)

@@ -52,6 +52,7 @@ def test_a_column_that_a_px4_log_lacks_is_named(tmp_path: Path) -> None:
         read_ulog(ulog(tmp_path / "a.ulg", ulog_rows(), topics))
 
 
+@pytest.mark.nightly
 def test_a_current_that_is_unknown_or_in_hundredths_is_no_power(tmp_path: Path) -> None:
     def changed(amp: Any) -> Path:
         rows = [
@@ -86,6 +87,7 @@ def test_a_message_of_very_many_numbers_is_refused_before_it_is_read(tmp_path: P
         read_ulog(ulog(tmp_path / "a.ulg", [], topics))
 
 
+@pytest.mark.nightly
 def test_damage_within_a_px4_log_ends_in_a_fit_or_a_message(tmp_path: Path) -> None:
     whole = ulog(tmp_path / "a.ulg", ulog_rows()).read_bytes()
     for at in range(300, len(whole), len(whole) // 12):

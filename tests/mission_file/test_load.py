@@ -84,6 +84,7 @@ def the_problem(whole: Any, folder: Path = Path()) -> tuple[str, str]:
     return found[0].where.split(": ", 1)[-1], found[0].message
 
 
+@pytest.mark.slow
 def test_motion_that_px4_flies_otherwise_has_defaults_of_its_own() -> None:
     own = [load(base(vehicles=[vehicle(autopilot=a)])).vehicles[0].vehicle for a in ("arducopter", "px4")]
     assert [(v.climb_m_s, v.land_m_s, v.corner_accel_m_s2) for v in own] == [(2.5, 0.5, 2.5), (3.0, 0.7, 1.5)]
@@ -247,6 +248,7 @@ def test_a_mistake_in_a_zone_is_told_with_its_key(zone: Any, key: str, words: st
     assert words in message
 
 
+@pytest.mark.slow
 def test_a_zone_of_one_dem_cell_is_judged_by_the_ground_in_it_alone() -> None:
     """On a slope the lowest corner of the cell is far below the lowest ground in a small zone."""
     mission = load(base())
@@ -343,6 +345,7 @@ def test_doubled_names_and_system_ids_are_told() -> None:
     assert {p.where.split(": ")[1] for p in found} == {"vehicles[1].name", "vehicles[1].sysid", "vehicles[2].sysid"}
 
 
+@pytest.mark.slow
 def test_vehicles_of_one_system_id_need_links_of_their_own() -> None:
     def wrong(*links: str | None) -> list[str]:
         some = [vehicle(name=f"v{k}", **({} if link is None else {"link": link})) for k, link in enumerate(links)]
@@ -481,6 +484,7 @@ def seeds() -> list[Any]:
     return [yaml.safe_load(EXAMPLE.read_text(encoding="utf-8").replace("5.0e6", "5.0e+6")), local(), base()]
 
 
+@pytest.mark.slow
 @settings(max_examples=draws(75), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data())
 def test_any_mutation_of_a_mission_loads_or_is_refused(seeds: list[Any], tmp_path: Path, data: st.DataObject) -> None:
@@ -515,6 +519,7 @@ def test_any_mutation_of_a_mission_loads_or_is_refused(seeds: list[Any], tmp_pat
     assert mission.airspace_scale >= 1.0
 
 
+@pytest.mark.slow
 @pytest.mark.draws
 def test_any_damage_to_the_text_of_a_mission_is_read_or_refused() -> None:
     assert draw_attacks(50, damaged) == {"read", "refused"}

@@ -82,6 +82,7 @@ def test_every_form_of_one_terrain_gives_the_ground_of_its_file(make: Callable[[
         assert found.grid.error_m == of_file.grid.error_m
 
 
+@pytest.mark.slow
 def test_a_masked_cell_and_a_nan_are_unknown_ground_in_every_type() -> None:
     for dtype in (np.int16, np.int64, np.float32, np.float64):
         heights = np.ma.array(HEIGHTS.astype(dtype), mask=np.zeros(HEIGHTS.shape, bool))

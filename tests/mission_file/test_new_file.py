@@ -19,6 +19,7 @@ START, GOAL = "[36.6175, -84.3892]", "[36.6133, -84.1667]"
 SAMPLE = Draft(START, GOAL, dem=("sample:jacksboro",))
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("autopilot", list(Autopilot))
 @pytest.mark.parametrize("whole", [False, True])
 def test_the_file_reads_as_it_was_meant(autopilot: Autopilot, whole: bool) -> None:
@@ -42,6 +43,7 @@ def test_the_file_reads_as_it_was_meant(autopilot: Autopilot, whole: bool) -> No
     assert whole or not any("bounds_speed" in note.code for note in read.notes)
 
 
+@pytest.mark.slow
 def test_every_choice_that_is_left_can_be_made() -> None:
     """Each line that is a key behind a # is a good one without it, the zones all together."""
     lines = text_of(SAMPLE, "a.yaml", "a").splitlines()

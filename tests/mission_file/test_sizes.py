@@ -58,6 +58,7 @@ def test_a_coast_of_30_000_corners_is_drawn_wider_with_a_note(within_s: list[flo
     assert "zone_outline_widened" in [note.code for note in mission.notes]
 
 
+@pytest.mark.nightly
 def test_a_ring_of_3_000_random_corners_is_not_untangled(within_s: list[float]) -> None:
     within_s.append(5.0)  # 150 s and 4 GB before
     assert "its outline of 3000 corners is too tangled to tell what it encloses" in said("crossing", 3000)
@@ -106,6 +107,7 @@ def test_terrain_files_are_counted() -> None:
     assert "2000" in str(refusal.value.problems)
 
 
+@pytest.mark.nightly
 def test_mistakes_are_counted(within_s: list[float]) -> None:
     within_s.append(6.0)  # 10,000 lines: 30 s before, and 25 minutes for a file of 5 MB
     large_inputs.mission()

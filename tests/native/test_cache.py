@@ -87,6 +87,7 @@ def test_code_is_kept_in_the_users_own_cache_and_nowhere_relative(
     assert list(elsewhere.iterdir()) == []
 
 
+@pytest.mark.nightly
 def test_without_any_home_kernels_are_compiled_in_memory(room: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def homeless(*_: object) -> Path:
         raise RuntimeError("Could not determine home directory.")

@@ -29,6 +29,7 @@ def test_options_that_this_numba_does_not_know_are_left_out() -> None:
     assert native.options(nogil=True, not_an_option=True) == {"nogil": True}
 
 
+@pytest.mark.nightly
 def test_bitcode_holds_a_function_of_each_kernels_name_and_hides_the_others() -> None:
     twins = native.with_numba({"summed": summed}, {id(f): f for f in (summed, doubled)}, set())
     assert set(twins) == {"summed"}

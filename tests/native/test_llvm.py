@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from gcsplan.native import cache
 from gcsplan.native.kernel_unit import QUICK_NOTICE, SLOW_NOTICE
 from gcsplan.native.llvm import HostMachine
@@ -11,6 +13,7 @@ from gcsplan.world.kernels.compiled import UNIT as WORLD
 from tests.support.toy_kernels import kernels, notices
 
 
+@pytest.mark.nightly
 def test_this_llvm_reads_what_is_shipped() -> None:
     bitcode = cache.read_shipped(WORLD.shipped, WORLD.digest())
     assert bitcode is not None

@@ -46,6 +46,7 @@ def refusal(desk: Desk, kind: str, **more: Any) -> dict[str, Any]:
     return desk.heard[-1]
 
 
+@pytest.mark.slow
 def test_a_dropped_mission_has_the_findings_of_the_command_line(desk: Desk, file: Path) -> None:
     found = drop(desk, "a b.waypoints", WAYPOINTS.encode())
     own = file.parent / "a_b.waypoints"
@@ -74,6 +75,7 @@ def test_a_file_that_cannot_be_read_is_answered_in_the_command_lines_words(desk:
     assert refusal(desk, "inspect")["code"] == "bad_file"
 
 
+@pytest.mark.slow
 def test_a_route_planned_anew_is_one_step_that_undo_takes_back(desk: Desk) -> None:
     found = drop(desk, "a.waypoints", WAYPOINTS.encode())
     assert (found["route"]["via"], found["route"]["left_out"]) == (1, [])

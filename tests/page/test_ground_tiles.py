@@ -33,6 +33,7 @@ def heights(png: bytes | None) -> np.ndarray[tuple[int, int], np.dtype[np.float6
     return red * 256.0 + green + blue / 256.0 - 32768.0
 
 
+@pytest.mark.slow
 def test_a_tile_has_the_heights_that_a_plan_flies_over() -> None:
     tiles = GroundTiles(SAMPLE_TERRAIN, Path(), None)
     lat, lon = SAMPLE_MIDDLE_DEG
@@ -73,6 +74,7 @@ def test_flat_ground_is_flat_and_has_no_edge() -> None:
     assert heights(tiles.png(12, 2144, 1455))[0, 0] == 400.0
 
 
+@pytest.mark.slow
 def test_hills_of_a_local_mission_stand_in_its_own_frame() -> None:
     section = {"flat_m": 0, "peaks": [{"center": [500, 500], "height_m": 100, "decay_m": [80, 80]}]}
     frame = Frame(46.5, 8.5)

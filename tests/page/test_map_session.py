@@ -39,6 +39,7 @@ def test_a_page_gets_the_state_then_the_certificate_then_the_way_home(desk: Desk
     assert desk.until("home")["vehicles"][0]["way_home"]["safe"] is not None
 
 
+@pytest.mark.slow
 def test_the_certificate_is_that_of_the_command_line(desk: Desk, file: Path) -> None:
     found = desk.ask("hello", "plan")["vehicles"][0]
     [own] = plan(load_mission(file)).vehicles
@@ -63,6 +64,7 @@ def test_a_drag_gets_one_path_for_the_newest_place_and_no_step(desk: Desk) -> No
     assert (state["undo"], state["vehicles"][0]["goal"]) == (False, [46.51, 8.51])
 
 
+@pytest.mark.slow
 def test_a_drop_is_one_step_that_undo_takes_back_and_redo_makes(desk: Desk) -> None:
     desk.ask("hello", "plan")
     desk.ask("change", "path", changes={GOAL: [46.512, 8.51]}, live=True)
@@ -74,6 +76,7 @@ def test_a_drop_is_one_step_that_undo_takes_back_and_redo_makes(desk: Desk) -> N
     assert desk.ask("redo", "state")["vehicles"][0]["goal"] == [46.513, 8.51]
 
 
+@pytest.mark.slow
 def test_a_drop_behind_a_drag_is_planned_without_the_path_of_the_drag(desk: Desk) -> None:
     desk.ask("hello", "home")
     heard: queue.Queue[dict[str, Any]] = queue.Queue()
@@ -95,6 +98,7 @@ def test_a_drop_behind_a_drag_is_planned_without_the_path_of_the_drag(desk: Desk
     assert not [a for a in answers if a["type"] == "path" and a["live"]]
 
 
+@pytest.mark.slow
 def test_a_page_that_comes_again_in_a_drag_gets_the_certificate_of_the_document(desk: Desk) -> None:
     desk.ask("hello", "plan")
     desk.ask("change", "path", changes={GOAL: [46.52, 8.51]}, live=True)
@@ -102,6 +106,7 @@ def test_a_page_that_comes_again_in_a_drag_gets_the_certificate_of_the_document(
     assert found["profile"]["lat"][-1] == pytest.approx(46.51)
 
 
+@pytest.mark.slow
 def test_escape_forgets_the_drag(desk: Desk) -> None:
     desk.ask("hello", "plan")
     desk.ask("change", "path", changes={GOAL: [46.52, 8.51]}, live=True)
@@ -125,6 +130,7 @@ def test_a_goal_in_a_zone_is_refused_with_its_place(desk: Desk) -> None:
         assert "mast" in refused["message"]
 
 
+@pytest.mark.slow
 def test_a_limit_that_leaves_no_path_is_refused_with_a_cure_that_does(desk: Desk) -> None:
     desk.ask("hello", "plan")
     refused = desk.ask("change", "refused", changes={"limits.max_amsl_m": 130})
@@ -229,6 +235,7 @@ def test_edits_that_are_not_saved_are_found_again(file: Path) -> None:
     assert Edits.of_file(file).restored is False
 
 
+@pytest.mark.slow
 def test_edits_of_another_state_of_the_file_are_not_written_over_it(file: Path) -> None:
     session = MapSession(Edits.of_file(file), METRIC, PageSteps)
     desk = Desk(session)
@@ -256,6 +263,7 @@ def test_a_mission_from_nothing_leaves_the_kept_edits_of_a_file_alone(tmp_path: 
         assert desk.ask("hello", "state")["restored"] is True
 
 
+@pytest.mark.slow
 def test_a_mission_begins_from_nothing_by_clicks_alone(tmp_path: Path) -> None:
     with desk_of(None, tmp_path) as desk:
         state = desk.ask("hello", "state")
@@ -315,6 +323,7 @@ def test_a_limit_in_feet_is_changed_in_feet(file: Path) -> None:
     assert "min_agl_ft: 120" in file.read_text()
 
 
+@pytest.mark.slow
 def test_units_change_the_words_and_not_the_numbers(desk: Desk) -> None:
     metric = desk.ask("hello", "plan")["vehicles"][0]
     feet = desk.ask("units", "plan", units="aviation")["vehicles"][0]

@@ -157,6 +157,7 @@ BAD_CHANGES: list[Any] = [
 ]  # fmt: skip
 
 
+@pytest.mark.slow
 def test_keys_that_name_files_or_links_cannot_be_changed(server: MapServer) -> None:
     with Page(server) as page:
         page.send("hello")

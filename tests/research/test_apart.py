@@ -114,6 +114,7 @@ def test_a_bench_of_research_says_what_it_needs(without_research: dict[str, Ende
     assert "this benchmark needs gcsplan.research, which is not installed" in end.err
 
 
+@pytest.mark.slow
 def test_the_schema_is_the_same_without_research(without_research: dict[str, Ended]) -> None:
     assert without_research["schema"] == ended("with", {"schema": ["schema"]})["schema"]
     assert without_research["schema"].out != ""

@@ -21,6 +21,7 @@ from tests.support import worlds
 from tests.support.rehearsal_parts import BRAKING_S, CLIMB_S, FLAT, a_part, kinds, reached_s
 
 
+@pytest.mark.slow
 def test_another_order_of_arrival_is_a_violation() -> None:
     parts = [a_part(1, (0, 0), (1000, 0)), a_part(2, (0, 300), (900, 300))]
     result = rehearse(parts, FLAT, Terms(("uav1", "uav2"), 30.0))
@@ -56,6 +57,7 @@ def test_landing_beside_one_that_stands_is_a_violation_until_the_pad_is_clear() 
     assert rehearse(parts, FLAT, Terms((), 15.0)).safe
 
 
+@pytest.mark.slow
 def test_a_battery_that_is_flown_too_low_is_a_violation() -> None:
     vehicle = replace(worlds.vehicle(), energy=Energy(120.0, 100.0, battery_j=130_000.0, reserve=0.2))
     part = a_part(1, (0, 0), (1000, 0), vehicle=vehicle)

@@ -26,6 +26,7 @@ from tests.support import worlds
 from tests.support.rehearsal_parts import FLAT, GROUND_M, a_part, kinds, reached_s
 
 
+@pytest.mark.slow
 def test_a_fleet_flies_what_its_boards_hold_and_arrives_when_arithmetic_says() -> None:
     parts = [
         a_part(n, (0, 200.0 * n), (1000, 200.0 * n), depart_s=9.0 * n, arrive_s=reached_s(1000) + 9.0 * n)
@@ -89,6 +90,7 @@ def test_a_mission_that_goes_nowhere_and_two_of_one_name_are_refused() -> None:
         rehearse([nowhere], FLAT, Terms())
 
 
+@pytest.mark.slow
 def test_corners_cut_into_a_zone_are_found_by_the_check_and_on_the_flown_track() -> None:
     inside = Zone("mast", Circle(498.6, 498.6, 1.2))
     world = worlds.world(GROUND_M, [inside], half_m=4000.0)
@@ -150,6 +152,7 @@ arrival: {mode: together, separation_m: 20, hold: ground}
 """
 
 
+@pytest.mark.slow
 def test_two_that_keep_their_speed_are_as_far_apart_in_the_air_as_planned() -> None:
     done = plan(load_mission("mission.yaml", text=CROSSING))
     assert done.fleet is not None

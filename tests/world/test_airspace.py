@@ -59,7 +59,7 @@ def kinds(airspace: Airspace, legs: Legs, limits: Limits) -> set[str]:
 # --- heights over the ground -----------------------------------------------------------------------------------------
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(6))
 def test_a_leg_from_border_to_border_through_a_polygon_is_seen(seed: int) -> None:
     """Both ends lie on the border up to a rounding, perhaps outside, and then no edge seems to cross the leg."""
@@ -379,6 +379,7 @@ def test_a_notch_in_a_polygon_is_free_and_clearance_closes_it() -> None:
     assert across.violations[0].value == pytest.approx(-200.0, abs=0.5)
 
 
+@pytest.mark.slow
 def test_without_clearance_a_polygon_may_be_touched() -> None:
     airspace, limits = flat([Zone("u", NOTCH)]), Limits(0.0)
     for a, b in (

@@ -25,7 +25,7 @@ from tests.support.random_worlds import (
 )
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("step", [0.0, 0.2, 1.0])
 @pytest.mark.parametrize("make", [in_plane, turned, in_degrees])
 def test_what_is_clear_of_ground_and_zones_passes_the_exact_check(make: object, step: float) -> None:

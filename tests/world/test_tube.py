@@ -76,6 +76,7 @@ def hug(tube: Tube, stations: Floats, sign: float, past_zones: bool) -> Floats |
     return sign * z
 
 
+@pytest.mark.slow
 @settings(max_examples=draws(80))
 @given(seed=st.integers(0, 2**32 - 1), kind=st.integers(0, 3))
 def test_a_profile_inside_the_tube_and_outside_the_bands_passes_the_check(seed: int, kind: int) -> None:

@@ -85,6 +85,7 @@ def test_plans_for_px4_are_judged_as_planted(folder: Path, options: WorldOptions
     assert amiss(written, check_with_options(options, None, list(written))) == []
 
 
+@pytest.mark.slow
 def test_the_place_of_a_violation_is_where_it_was_planted(folder: Path, options: WorldOptions) -> None:
     written = corpus.write(folder, {"qgc": corpus.WITH_HOME["qgc"]})
     files = {case.name: file for file, case in written.items()}
@@ -150,6 +151,7 @@ def test_an_option_that_is_off_is_named(options: WorldOptions, change: dict[str,
     assert said in str(refused.value)
 
 
+@pytest.mark.slow
 def test_a_zone_that_is_under_ground_here_and_reaches_far_beyond_is_no_mistake(
     folder: Path, options: WorldOptions
 ) -> None:
@@ -195,6 +197,7 @@ def file_of(folder: Path, name: str, manner: str = "plan") -> str:
     return next(f for f, case in written.items() if case.name == name)
 
 
+@pytest.mark.slow
 def test_quiet_says_nothing_of_what_passes_and_one_line_of_each_finding(
     run: Any, folder: Path, world: list[str]
 ) -> None:
@@ -206,6 +209,7 @@ def test_quiet_says_nothing_of_what_passes_and_one_line_of_each_finding(
     assert line.startswith(f"{bad}:5: zone: inside no-fly zone “tower”")
 
 
+@pytest.mark.slow
 def test_a_table_the_nearest_misses_and_a_profile_are_shown(run: Any, folder: Path, world: list[str]) -> None:
     code, out, err = run(file_of(folder, "round"), *world)
     assert code == 0
@@ -224,6 +228,7 @@ def rows_of(table: str) -> list[list[str]]:
     ]
 
 
+@pytest.mark.slow
 def test_a_spline_is_one_row_however_many_chords_it_has(run: Any, folder: Path, world: list[str]) -> None:
     file = file_of(folder, "spline")
     _, out, _ = run(file, *world, "--json")
@@ -241,6 +246,7 @@ def test_a_spline_is_one_row_however_many_chords_it_has(run: Any, folder: Path, 
     assert seconds(row[-1]) == pytest.approx(sum(leg["time_s"] for leg in chords), abs=0.51)
 
 
+@pytest.mark.slow
 def test_findings_stand_before_the_table(run: Any, folder: Path, world: list[str]) -> None:
     code, out, _ = run(file_of(folder, "through_zone"), *world)
     assert code == 4
@@ -266,6 +272,7 @@ def test_json_holds_every_leg_and_miss_with_places_to_a_centimetre(run: Any, fol
     assert document["inputs"]["vertical_datum"] == "EGM96"
 
 
+@pytest.mark.slow
 def test_a_file_that_cannot_be_read_is_exit_2_unless_another_is_worse(run: Any, folder: Path, world: list[str]) -> None:
     broken = folder / "broken.plan"
     broken.write_text("{}")
@@ -310,7 +317,7 @@ def test_wrong_usage_is_explained(run: Any, arguments: list[str], said: str) -> 
     assert said in err
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("far", [(36.6, 177.0), (0.0, 5.6), (-36.6, 95.6), (38.6, -84.3)])
 def test_a_spline_to_the_other_end_of_the_world_is_a_finding_and_asks_for_no_terrain(
     run: Any, folder: Path, world: list[str], far: tuple[float, float]
@@ -326,6 +333,7 @@ def test_a_spline_to_the_other_end_of_the_world_is_a_finding_and_asks_for_no_ter
     assert "Warning" not in err
 
 
+@pytest.mark.slow
 def test_a_mission_files_world_reaches_as_far_as_the_file_flies(run: Any, folder: Path, world: list[str]) -> None:
     # The mission itself stays in one corner; the file goes round the whole terrain.
     lat, lon = corpus.degrees(*corpus.HOME)
@@ -347,6 +355,7 @@ vehicles:
     assert "does not know" in out
 
 
+@pytest.mark.slow
 def test_a_file_in_terrain_frame_is_judged_with_the_terrain_error_in_any_mission(
     run: Any, folder: Path, world: list[str]
 ) -> None:

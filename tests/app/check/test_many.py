@@ -178,6 +178,7 @@ def test_a_bug_in_one_file_is_told_and_the_others_are_judged(
     assert summary.code == 70
 
 
+@pytest.mark.slow
 def test_files_too_far_apart_for_one_plane_have_a_world_each(
     folder: Path, options: WorldOptions, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -199,6 +200,7 @@ def test_too_many_files_are_refused(options: WorldOptions, monkeypatch: pytest.M
         Archive.with_options(options, None, ["x"] * 4, NO_RETURNS, Shown())
 
 
+@pytest.mark.slow
 def test_other_terrain_at_a_worker_is_an_error(options: WorldOptions, files: list[str]) -> None:
     archive = Archive.with_options(options, None, files[:2], NO_RETURNS, Shown())
     archive.read(Inline())
@@ -305,6 +307,7 @@ def test_an_interruption_leaves_what_is_done(
     assert last["summary"]["files"] == 4
 
 
+@pytest.mark.slow
 def test_folders_and_patterns_name_files(run: Any, tmp_path: Path, folder: Path, world: list[object]) -> None:
     (tmp_path / "deep").mkdir()
     good = [f for f, case in corpus.write(folder, MIXED).items() if case.name == "round" and "plan" in f]

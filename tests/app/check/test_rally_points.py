@@ -72,7 +72,7 @@ def board(call: Any) -> LoopbackVehicle:
     return LoopbackVehicle(1, kind, lat_deg=36.6, lon_deg=-84.38, amsl_m=300.0)
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 def test_own_lists_are_sent_read_back_and_named_where_they_are_not(run: Any) -> None:
     brings([[36.6, -84.375, 0.0], [36.6, -84.372, 0.0]], OUT, IN)
     vehicle = board(run)
@@ -100,7 +100,7 @@ def test_own_lists_are_sent_read_back_and_named_where_they_are_not(run: Any) -> 
         assert len(vehicle.items(FENCE)) == 5
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 def test_a_zone_that_the_files_fence_has_already_is_sent_once(run: Any) -> None:
     assert run("plan", "m.yaml", "-o", "out", "--fence")[0] == 0
     vehicle = board(run)
@@ -127,7 +127,7 @@ def test_rally_points_in_zones_underground_or_outside_the_fence_are_refused(run:
         assert words in out + err
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 def test_returns_lead_to_the_nearest_rally_point(run: Any) -> None:
     """A point behind the mast's zone makes a return fly through it, though the way home is clear."""
     for points, code in (([], 0), ([[36.6, -84.379, 0.0]], 0), ([[36.6, -84.379, 0.0], [36.605, -84.37, 0.0]], 4)):

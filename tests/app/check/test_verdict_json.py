@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 
+import pytest
+
 from gcsplan.app.check.verdict_json import extremes, flat, verdict_of
 from gcsplan.app.plan.way_home import homes_of
 from gcsplan.notes.note import Wording
@@ -39,6 +41,7 @@ def test_extremes_name_the_zone_that_is_passed_and_the_one_that_is_nearest() -> 
     assert told["max_agl_m"] == max(leg.max_agl_m for leg in verdict.legs)
 
 
+@pytest.mark.slow
 def test_the_way_home_decides_the_words() -> None:
     plan = planned()
     [v] = plan.vehicles

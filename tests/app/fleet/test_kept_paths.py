@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import pytest
+
 from gcsplan.app.fleet.kept_paths import KeptPaths
 from gcsplan.app.fleet.pipeline import plan_again
 from gcsplan.app.plan.model import PlanOptions
@@ -20,6 +22,7 @@ PAIR: dict[str, Any] = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 def test_another_arrival_needs_no_search_and_gives_the_same_missions() -> None:
     session = Planner(PAIR)
     heard: list[str] = []

@@ -46,6 +46,7 @@ OVER_A_ZONE: dict[str, Any] = {
 }  # fmt: skip
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("autopilot", ["arducopter", "px4", "arduplane"])
 @pytest.mark.parametrize("track_error_m", [0, 3])
 def test_corners_are_cut_above_what_the_path_passes_over_though_no_error_is_allowed(
@@ -61,6 +62,7 @@ def test_corners_are_cut_above_what_the_path_passes_over_though_no_error_is_allo
     assert v.gap_percent < 0.5
 
 
+@pytest.mark.slow
 def test_a_return_through_a_zone_is_refused_with_what_helps() -> None:
     craft = OVER_A_ZONE["vehicles"][0] | {"autopilot": "arducopter", "end": "rtl", "rtl_rel_home_m": 60}
     asked = OVER_A_ZONE | {"limits": {"min_agl_m": 40, "max_climb_deg": 30}, "vehicles": [craft]}
@@ -71,6 +73,7 @@ def test_a_return_through_a_zone_is_refused_with_what_helps() -> None:
         assert plan(load_mission(DATA / "over.yaml", text=yaml.safe_dump(again))).vehicles[0].verdict.safe is True
 
 
+@pytest.mark.slow
 def test_corners_are_cut_above_hills_though_no_error_is_allowed() -> None:
     (v,) = planned(limits={"track_error_m": 0, "altitude_error_m": 0}).vehicles
     assert v.verdict.safe is True

@@ -95,6 +95,7 @@ def test_the_first_refusal_in_the_file_counts_whoever_answers_first() -> None:
         planned_by(both, brief())
 
 
+@pytest.mark.slow
 def test_who_has_no_mission_is_left_out_where_that_is_allowed_and_bad_input_never_is() -> None:
     leaving = LeavingOut(allowed=True)
     made = planned_by(LastFirst(uav1=NoMission("no way", reason="blocked")), brief(), leaving=leaving)

@@ -152,6 +152,7 @@ class Pickled(Executor):
             yield number, pickle.loads(pickle.dumps(args[0](*args[1:])))
 
 
+@pytest.mark.nightly
 def test_planning_with_an_executor_is_planning() -> None:
     """The way over pickled answers, without processes: what comes back makes the same plan."""
     alone = plan(fleet())
@@ -256,6 +257,7 @@ def test_a_fleet_planned_by_processes_is_the_same(workers: Executor) -> None:
     assert told(plan(fleet(), cluster=workers.client)) == told(plan(fleet()))
 
 
+@pytest.mark.nightly
 def test_terrain_that_planning_widened_is_the_same_here() -> None:
     """The way round the wall leaves the first window, and the answer comes back over the wider one."""
     wall = [[46.9, 8.01], [46.9, 8.0101], [47.08, 8.0101], [47.08, 8.01]]

@@ -41,6 +41,7 @@ def test_the_same_plan_again_has_no_difference(tmp_path: Path, first: Plan) -> N
     assert difference.before == pytest.approx(difference.after, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_a_new_zone_moves_legs_and_the_earlier_mission_breaks_it(tmp_path: Path, first: Plan) -> None:
     second = planned(tmp_path, **ZONE)
     [difference] = differences(second, last_plan(second.source, tmp_path / "out")[0]).values()
@@ -56,6 +57,7 @@ def test_a_new_zone_moves_legs_and_the_earlier_mission_breaks_it(tmp_path: Path,
     assert str(difference.headline.text()).split(",")[0] in page
 
 
+@pytest.mark.slow
 def test_the_mission_on_board_is_compared_without_a_summary(tmp_path: Path, first: Plan) -> None:
     second = planned(tmp_path, **ZONE)
     there = {"uav1": EarlierMission("udpout:127.0.0.1:14550", first.vehicles[0].mission)}

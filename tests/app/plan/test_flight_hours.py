@@ -93,6 +93,7 @@ def test_a_vehicle_that_waits_has_fewer_hours_left() -> None:
     assert hours_left(replace(source, hours=None), v, made.fleet) is None
 
 
+@pytest.mark.slow
 def test_a_flight_beyond_its_forecast_is_not_judged_however_it_is_checked(tmp_path: Path) -> None:
     late = ["2026-11-28T13:55Z", "2026-11-28T13:59Z"]  # the forecast ends at 14:00
     source = load_mission(mission_in_forecast(tmp_path / "f.json", late, (47.0, 8.07)))

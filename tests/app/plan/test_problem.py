@@ -23,6 +23,7 @@ def test_a_battery_that_is_too_small_is_named() -> None:
     assert refused.value.reason == "battery"
 
 
+@pytest.mark.slow
 def test_a_take_off_below_the_limits_is_bad_input_and_one_at_them_is_raised() -> None:
     with pytest.raises(InputError, match="takeoff_agl_m"):
         planned({"takeoff_agl_m": 50})
@@ -84,6 +85,7 @@ def test_a_fastest_path_that_is_not_known_is_refused_with_its_cure(
     assert "planner.objective" in str(refused.value)
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize(
     ("battery", "key"),
     [({"battery_wh": 10}, "battery_wh"), ({"battery_mah": 500, "battery_v": 22.2}, "battery_mah"),

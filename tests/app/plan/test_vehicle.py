@@ -38,6 +38,7 @@ def test_every_autopilot_gets_a_safe_mission_whose_files_read_back_the_same(auto
         assert read.home == v.mission.home
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("frame", ["relative", "amsl", "terrain"])
 def test_every_altitude_frame_is_planned_with_its_own_errors(frame: str) -> None:
     done = planned({"max_climb_deg": 35}, altitude_frame=frame)
@@ -49,6 +50,7 @@ def test_every_altitude_frame_is_planned_with_its_own_errors(frame: str) -> None
     assert v.verdict.lowest.min_agl_m >= (95 if frame == "terrain" else 65)
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("end", ["land", "loiter", "none"])
 def test_every_end_is_planned(end: str) -> None:
     done = planned({"end": end})
@@ -56,6 +58,7 @@ def test_every_end_is_planned(end: str) -> None:
     assert commands(done)[-1] == {"land": cmd.LAND, "loiter": cmd.LOITER_UNLIM, "none": cmd.WAYPOINT}[end]
 
 
+@pytest.mark.slow
 def test_via_points_are_passed() -> None:
     done = planned({"via": [[36.602, -84.368], [36.600, -84.360, 150]]})
     (v,) = done.vehicles
@@ -67,6 +70,7 @@ def test_via_points_are_passed() -> None:
     assert v.verdict.safe is True
 
 
+@pytest.mark.slow
 def test_a_plan_with_larger_margins_has_a_bound_under_the_limits_of_the_check(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of its own ends, which the larger margins may raise; margins are the path's, not the bound's."""
     (once,) = planned().vehicles
@@ -95,6 +99,7 @@ def test_a_plan_with_larger_margins_has_a_bound_under_the_limits_of_the_check(mo
     assert once.solution.notes == ()
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize(("climb_deg", "vias"), [(90.0, FOUR), (30.0, FOUR), (90.0, SEVEN)])
 def test_vias_over_one_place_are_climbs_on_the_spot(climb_deg: float, vias: list[list[float]]) -> None:
     """Over the start, at two or three altitudes over a place on the way, and over the goal."""

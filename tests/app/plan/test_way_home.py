@@ -56,6 +56,7 @@ def test_where_no_altitude_helps_a_path_back_is_proposed() -> None:
     assert ("instead", home.path_back) in [(row.label, row.note) for row in home.rows()]
 
 
+@pytest.mark.slow
 def test_the_path_back_is_written_judged_and_makes_every_return_safe() -> None:
     straight, done = planned(), planned(return_route="mission")
     (v,) = done.vehicles
@@ -77,6 +78,7 @@ def test_the_path_back_is_written_judged_and_makes_every_return_safe() -> None:
     assert [i["command"] for i in json.loads(written["uav1.plan"])["mission"]["items"]][start] == 188
 
 
+@pytest.mark.slow
 def test_the_parameters_on_board_must_choose_the_route_that_was_judged() -> None:
     done = planned(return_route="mission")
     home, m = homes_of(done)["uav1"], done.vehicles[0].mission
@@ -113,6 +115,7 @@ def test_a_path_back_keeps_the_descent_limit_where_the_way_out_climbs() -> None:
     assert done.vehicles[0].verdict.max_climb_deg <= 12.0 + 1e-6
 
 
+@pytest.mark.slow
 def test_a_return_into_a_wind_that_is_too_strong_at_its_height_is_not_safe() -> None:
     calm_below = [{"agl_m": 60, "speed_m_s": 3, "from_deg": 90}, {"agl_m": 100, "speed_m_s": 20, "from_deg": 270}]
     vehicle = {

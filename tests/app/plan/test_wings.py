@@ -437,7 +437,7 @@ def test_two_vias_with_right_angles_are_passed_over_flat_ground() -> None:
     assert_past_vias(over_flat(*places), places[:-1])
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("most_deg", [12.0, 35.0, 115.0])
 @pytest.mark.parametrize("count", [2, *(pytest.param(k, marks=pytest.mark.slow) for k in (3, 4))])
 def test_any_vias_far_apart_are_passed_over_flat_ground(count: int, most_deg: float) -> None:
@@ -447,6 +447,7 @@ def test_any_vias_far_apart_are_passed_over_flat_ground(count: int, most_deg: fl
         assert_past_vias(over_flat(*places, radius_m=radius_m, end=end), places[:-1])
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("apart", [1.98, 2.2, 3.3, 5.0])
 def test_a_survey_in_rows_of_a_few_radii_is_flown(apart: float) -> None:
     rows: list[tuple[float, float]] = []
@@ -594,6 +595,7 @@ def test_the_simulated_aircraft_takes_as_long_as_planned(landing: Plan) -> None:
     assert took_s[: track.goal].sum() == pytest.approx(planned.arrive_s, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_where_no_climb_out_is_legal_on_the_wanted_heading_the_refusal_names_it() -> None:
     source = load_mission(MISSIONS / "m.yaml", text=text_of(takeoff_heading_deg="210"))
     with pytest.raises(NoMission, match="no climb-out on takeoff_heading_deg 210") as caught:
@@ -609,6 +611,7 @@ def test_a_climb_out_that_is_not_clear_in_declared_winds_names_them_in_a_sentenc
         plan(load_mission(MISSIONS / "m.yaml", text=text))
 
 
+@pytest.mark.slow
 def test_a_climb_out_that_obstacles_close_says_so_and_what_to_do() -> None:
     forested = text_of().replace("obstacle_height_m: 0", "obstacle_height_m: 12")  # altitude_error_m is 8
     with pytest.raises(NoMission, match=r"obstacle_height_m puts them everywhere.*give `canopy`"):
@@ -656,6 +659,7 @@ def test_that_margins_shut_the_way_between_a_wings_ends_is_no_proof(monkeypatch:
     assert [p.checked for p in asked] == [None, v.problem.checked]
 
 
+@pytest.mark.slow
 def test_a_straight_climb_of_kilometres_offers_circles_which_climb_near_the_start() -> None:
     vehicle = {
         "name": "w1", "sysid": 1, "autopilot": "arduplane", "start": [47.0, 8.0], "goal": [47.0, 8.06],

@@ -67,6 +67,7 @@ def test_arducopter_returns_no_higher_than_its_fence(parameters: dict[str, float
     assert words in result.message
 
 
+@pytest.mark.slow
 def test_a_return_above_the_flight_needs_the_ceiling_and_its_margin() -> None:
     done = planned(keys(rtl_rel_home_m=80), way_home="required")
     high = board(RTL_ALT=8000.0, **ON, FENCE_ALT_MAX=81)

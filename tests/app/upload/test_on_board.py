@@ -121,6 +121,7 @@ def test_what_breaks_a_limit_on_board_is_each_finding_as_data() -> None:
     assert all(isinstance(note, Note) for note in low.data["found"])  # type: ignore[union-attr]
 
 
+@pytest.mark.slow
 def test_a_vehicle_whose_parameters_take_it_beyond_the_forecast_is_not_judged(tmp_path: Path) -> None:
     begin, end = datetime(2026, 11, 28, 13, 50, tzinfo=UTC), datetime(2026, 11, 28, 14, tzinfo=UTC)
     for _ in range(2):  # the second one lands as late as the forecast allows

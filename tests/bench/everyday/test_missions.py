@@ -14,6 +14,7 @@ from gcsplan.bench.everyday import run as everyday
 from gcsplan.bench.everyday.missions import EVERYDAY_KINDS, draw
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("kind", EVERYDAY_KINDS)
 def test_missions_are_the_same_for_the_same_seed_and_can_be_read(kind: str) -> None:
     number = EVERYDAY_KINDS.index(kind) + len(EVERYDAY_KINDS)

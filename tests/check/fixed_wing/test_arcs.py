@@ -145,7 +145,7 @@ def test_a_verdict_on_arcs_can_be_safe_and_says_what_it_assumes() -> None:
     assert (arcs.data["radius_m"], climb.data["heading_deg"]) == (100.0, pytest.approx(90.0, abs=0.1))
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_the_lowest_height_above_ground_is_what_sampling_the_flown_track_finds(seed: int) -> None:
     rng = np.random.default_rng(seed)

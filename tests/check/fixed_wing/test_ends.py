@@ -77,6 +77,7 @@ def test_a_ceiling_is_kept_by_an_aircraft_that_levels_off_late() -> None:
     assert verdict(0.0, 1500.0, max_agl_m=97.0).findings == ()
 
 
+@pytest.mark.slow
 def test_an_early_way_to_an_item_above_ground_follows_the_ground() -> None:
     """A valley of 30 m lies across the ways to (3000, 560): they sink into it, down to what stands at its bottom."""
 
@@ -154,6 +155,7 @@ def test_a_known_climb_out_is_judged_as_slant_too() -> None:
         assert {f.kind for f in verdict(0.0, 1500.0, mast, climbs=climbs).findings} == {"zone"}
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize(
     "climbs", [ClimbOut(9.5, 25.0), ClimbOut(2.9, 20.0), ClimbOut(2.82, 20.0), ClimbOut(4.0, 28.0)]
 )

@@ -109,6 +109,7 @@ def flown(vehicle: Vehicle) -> Verdict:
     return judge(mission, vehicle, wings.FLAT)
 
 
+@pytest.mark.slow
 def test_turns_whose_bank_the_wind_makes_too_steep_are_not_judged() -> None:
     calm = flown(replace(wings.wing(), speed_max_m_s=20.0))
     assert "arcs_too_banked" not in [n.code for n in calm.not_judged]

@@ -72,6 +72,7 @@ def test_still_air_has_no_window_and_every_figure_as_before() -> None:
     assert flown(blows((0, 0), (0, 0))).legs == flown(None).legs
 
 
+@pytest.mark.slow
 def test_a_constant_wind_gives_one_time_and_only_what_the_lean_allows() -> None:
     still, blown = flown(None), flown(blows((6, 6), (90, 90)))
     earliest_s, latest_s = window_of(blown)
@@ -99,6 +100,7 @@ def test_a_set_holds_every_wind_of_it_in_window_and_energy(autopilot: Autopilot)
         assert (spent_j(one) <= spent_j(whole) + 1e-6).all()
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("base_w", [0.0, 200.0])
 def test_out_and_back_in_one_wind_counts_its_headwind_once(base_w: float) -> None:
     craft, back = replace(leaning(), energy=Energy(base_w=base_w)), [[0.0, 0, 366], [4000, 0, 366], [0.0, 0, 366]]
@@ -125,6 +127,7 @@ def test_a_late_departure_widens_every_window_and_changes_no_figure(craft: Vehic
     assert (after.earliest_s == before.earliest_s).all()
 
 
+@pytest.mark.slow
 def test_a_wind_too_strong_is_refused_with_one_that_was_tried() -> None:
     verdict = flown(blows((0, 20), (0, 360)))
     [finding] = verdict.findings
@@ -158,6 +161,7 @@ def test_a_wing_arrives_when_the_pilots_handbook_says() -> None:
     assert latest_s == pytest.approx(earliest_s, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_gusts_count_in_what_it_must_be_able_to_do_and_have_their_share() -> None:
     calm, gusty = window_of(flown(blows((5, 5), (90, 90)))), window_of(flown(blows((5, 5), (90, 90), gust_m_s=8.0)))
     assert gusty[1] > calm[1]
@@ -185,6 +189,7 @@ def test_a_forecast_counts_in_the_hours_of_the_flight() -> None:
     assert found[1] == pytest.approx(window_of(flown(blows((6, 6), (90, 90))))[1], rel=1e-6)
 
 
+@pytest.mark.slow
 def test_the_battery_and_the_way_home_count_the_worst_wind() -> None:
     craft = replace(leaning(), energy=Energy(battery_j=2e6, hover_w=100.0))
     home = (36.6, -84.3, 300.0)
@@ -221,6 +226,7 @@ CRAFT: dict[str, dict[str, Any]] = {
 }  # fmt: skip
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("kind", CRAFT)
 @given(st.integers(1, 7), st.integers(0, 2**32 - 1))
 def test_slower_legs_are_never_done_earlier_but_for_what_is_uneven(kind: str, count: int, seed: int) -> None:

@@ -129,6 +129,7 @@ def test_past_a_corner_it_runs_as_far_as_the_speed_in_the_corner_leads() -> None
     assert past[3] == pytest.approx(1.25 + 5.0 * radius / 5.0)
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("speed", [12.0, 16.0, 20.0, 24.0, 30.0])
 def test_a_plane_turns_about_within_the_formula_wherever_home_lies(speed: float) -> None:
     v = replace(vehicle(PLANE, track_error_m=5.0), speed_max_m_s=speed)

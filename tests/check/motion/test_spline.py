@@ -13,13 +13,14 @@ from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.geometry.limits import Limits
+from tests.support.effort import seeds
 from tests.support.worlds import world
 
 WGS84 = Geod(ellps="WGS84")
 LOOKS = 200_000
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", seeds(6, 6, 40))
 def test_no_place_of_a_curve_is_steeper_than_is_said(seed: int) -> None:
     """Compared with 200,000 samples of the curve; curves that almost turn back peak within a thousandth of it."""
     rng = np.random.default_rng(seed)
@@ -43,7 +44,7 @@ def test_no_place_of_a_curve_is_steeper_than_is_said(seed: int) -> None:
 
 
 @pytest.mark.parametrize("stands", ["at_start", "at_end", "on_the_way"])
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", seeds(2, 2, 20))
 def test_where_a_curve_stands_still_it_is_as_steep_as_it_leaves_and_arrives(stands: str, seed: int) -> None:
     """A spline after a hold begins with speed zero: its slope there is the limit of the slope."""
     rng = np.random.default_rng(seed)
@@ -84,6 +85,7 @@ NARROW = ((0, 60), (40, 100), (90, 90), (120, 40), (160, 40), (190, 80), (240, 8
 LEVEL, HILLY = (40,) * 8, (40, 55, 45, 60, 50, 40, 52, 45)
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize(
     ("places", "heights", "speed_m_s", "flown_s"),
     [

@@ -60,6 +60,7 @@ def test_a_path_back_over_the_ridge_is_safe_where_no_low_return_is() -> None:
     assert any(f.kind == "min_agl" for f in judge(broken, v, w).findings)
 
 
+@pytest.mark.slow
 def test_the_way_to_the_path_is_judged_not_only_the_path() -> None:
     """The path is safe by itself, 300 m aside; a tower stands between the mission and the path."""
     tower = Zone("tower", Circle(1000.0, 150.0, 60.0))
@@ -108,6 +109,7 @@ def test_rounds_before_a_start_cost_their_energy_and_change_nothing_else() -> No
     assert often.battery.most_j - once.battery.most_j == pytest.approx(3 * 6000.0 * 100.0, rel=0.02)
 
 
+@pytest.mark.slow
 def test_a_plane_swings_wide_where_it_joins() -> None:
     """Over flat ground only what stands beside the path by less than two turns about is in the way."""
     w, v = world(half_m=9000.0), vehicle(PLANE)

@@ -17,6 +17,7 @@ from tests.support.noted import codes
 from tests.support.worlds import vehicle, world
 
 
+@pytest.mark.slow
 def test_a_landing_sequence_is_joined_at_its_first_place_from_everywhere() -> None:
     w, v = world(ridge), vehicle(**BARE)
     start = Item(cmd.DO_LAND_START, NO_POSITION)
@@ -34,6 +35,7 @@ def test_a_landing_sequence_is_joined_at_its_first_place_from_everywhere() -> No
     assert joined(world(), two, v).starts == (7, 10)
 
 
+@pytest.mark.slow
 def test_past_a_start_in_the_order_of_the_items_it_just_continues() -> None:
     w, v = world(ridge), vehicle(**BARE)
     whole = mission(w, OVER, land=False)
@@ -63,6 +65,7 @@ def test_what_is_not_known_is_not_judged(items: list[Item], code: str) -> None:
     assert code in codes(home.not_judged)
 
 
+@pytest.mark.slow
 def test_px4_is_not_judged_and_a_plane_needs_to_say_which_way_it_returns() -> None:
     m = back(mission(world(), [(0, 0, 80), (2000, 0, 80)], PX4))
     assert joined(world(), m).safe is None

@@ -126,7 +126,7 @@ def test_at_the_lowest_altitude_it_is_safe_and_a_little_below_it_is_not(autopilo
     assert judged(w, m, v, lowest - 1.2).safe is False
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("autopilot", [Autopilot.ARDUCOPTER, Autopilot.ARDUPLANE])
 def test_lines_home_that_are_judged_a_few_at_once_give_the_same(
     autopilot: Autopilot, monkeypatch: pytest.MonkeyPatch
@@ -152,6 +152,7 @@ def test_lines_home_that_are_judged_a_few_at_once_give_the_same(
     assert len(counted_at_once) > calls
 
 
+@pytest.mark.slow
 def test_without_an_altitude_the_autopilots_default_is_judged_and_said_so() -> None:
     for autopilot, parameter, default in (
         (COPTER, "RTL_ALT", 15.0), (PLANE, "RTL_ALTITUDE", 100.0), (PX4, "RTL_RETURN_ALT", 30.0),
@@ -164,6 +165,7 @@ def test_without_an_altitude_the_autopilots_default_is_judged_and_said_so() -> N
     assert home.notes == ()
 
 
+@pytest.mark.slow
 def test_a_zone_over_the_way_bounds_the_return_from_above() -> None:
     shelf = Zone("shelf", Circle(1000.0, 0.0, 200.0), floor=Level(420.0, "amsl"))
     w = world(300.0, [shelf])
@@ -177,6 +179,7 @@ def test_a_zone_over_the_way_bounds_the_return_from_above() -> None:
     assert high.unsafe[0].from_m == pytest.approx(800.0 - 46.25, abs=5.0)
 
 
+@pytest.mark.slow
 def test_over_a_zone_on_a_slope_the_climb_counts_the_ceiling_there_alone() -> None:
     # The ground, and with it the zone's ceiling, rises towards home. The flight passes 3 m above the ceiling under it,
     # lower than the ceiling nearer home; the return climbs on the spot above all of it.
@@ -207,6 +210,7 @@ def test_what_stays_unsafe_without_rally_points_is_no_matter_of_the_battery() ->
     assert str(replace(told, left=()).advice).endswith("then no safe return from 200 m of it (battery)")
 
 
+@pytest.mark.slow
 def test_a_column_must_not_climb_into_a_zone_and_home_may_lie_under_one() -> None:
     lid = Zone("lid", Circle(0.0, 0.0, 50.0), floor=Level(400.0, "amsl"))
     w = world(300.0, [lid])
@@ -216,6 +220,7 @@ def test_a_column_must_not_climb_into_a_zone_and_home_may_lie_under_one() -> Non
     assert judged(w, m, vehicle(**BARE)).highest_rel_home_m == pytest.approx(95.0, abs=0.01)
 
 
+@pytest.mark.slow
 def test_a_wall_without_a_top_leaves_no_altitude_and_rally_points_mend_it() -> None:
     tower = Zone("tower", Circle(1500.0, 0.0, 150.0))
     w = world(300.0, [tower])
@@ -266,6 +271,7 @@ def test_rally_points_are_chosen_by_few_parts_of_a_mission_of_many_stretches(mon
     )
 
 
+@pytest.mark.slow
 def test_a_mission_that_hugs_a_zone_is_not_called_shut_in() -> None:
     # The shortest track around a tower touches its clearance: returns from behind it are blocked, from before it not.
     turn, reach = math.asin(230.03 / 1500.0), math.sqrt(1500.0**2 - 230.03**2)
@@ -308,6 +314,7 @@ def test_each_autopilot_gets_rally_points_at_the_altitude_that_it_understands() 
                 assert point.rel_home_m >= max(home.advised_rel_home_m, on_ground + 5.0) - 0.01
 
 
+@pytest.mark.slow
 def test_what_rally_points_leave_unsafe_is_what_brute_force_finds() -> None:
     tower = Zone("tower", Circle(1500.0, 0.0, 150.0))
     w = world(300.0, [tower])
@@ -324,6 +331,7 @@ def test_what_rally_points_leave_unsafe_is_what_brute_force_finds() -> None:
             assert any(s.from_m <= along <= s.to_m for s in home.left), along
 
 
+@pytest.mark.slow
 def test_within_the_cone_less_is_climbed_and_both_are_judged() -> None:
     # A knob 60 m high, 100 m east of home; returns from 180 m east must pass above it.
     def knob(east: Floats, north: Floats) -> Floats:
@@ -344,6 +352,7 @@ def test_within_the_cone_less_is_climbed_and_both_are_judged() -> None:
     assert [s.zone for s in judged(w, px4, sharp, 100.0).unsafe] == ["post"]  # PX4's 45 m is below the post's 50 m
 
 
+@pytest.mark.slow
 def test_a_plane_climbs_on_its_way_and_may_meet_what_an_altitude_would_clear() -> None:
     w = world(ridge)
     far = [(0.0, 0.0, 150.0), (6000.0, 0.0, 150.0), (6000.0, 0.0, 60.0)]
@@ -357,6 +366,7 @@ def test_a_plane_climbs_on_its_way_and_may_meet_what_an_altitude_would_clear() -
     assert copter.unsafe == ()
 
 
+@pytest.mark.slow
 def test_a_planes_columns_are_left_out_and_said_so() -> None:
     m = mission(world(), [(0, 0, 120), (3000, 0, 120)], PLANE)
     home = judged(world(), m, vehicle(PLANE, **BARE), 100.0)
@@ -391,6 +401,7 @@ def test_the_lowest_height_of_all_returns_is_told() -> None:
     assert high.as_dict()["lowest_agl_m"] == high.lowest.agl_m
 
 
+@pytest.mark.slow
 def test_reasons_of_a_return_are_named_together_and_stretches_cut_where_they_change() -> None:
     # Behind the ridge, on the northern half of the way, the line home meets the tower too.
     tower = Zone("tower", Circle(1600.0, 400.0, 150.0))
@@ -416,6 +427,7 @@ def test_reasons_of_a_return_are_named_together_and_stretches_cut_where_they_cha
     assert [s.from_m for s in home.unsafe] == sorted(s.from_m for s in home.unsafe)
 
 
+@pytest.mark.slow
 def test_where_no_altitude_helps_though_each_obstacle_has_one_it_says_what_is_above() -> None:
     lid = Zone("lid", Circle(1000.0, 0.0, 400.0), floor=Level(402.0, "amsl"))
     w = world(ridge, [lid])
@@ -429,6 +441,7 @@ def test_where_no_altitude_helps_though_each_obstacle_has_one_it_says_what_is_ab
     )
 
 
+@pytest.mark.slow
 def test_over_unknown_ground_no_return_is_safe() -> None:
     def hole(east: Floats, north: Floats) -> Floats:
         return np.where((np.abs(east - 1000.0) < 150.0) & (np.abs(north) < 150.0), np.nan, 300.0)
@@ -503,6 +516,7 @@ def test_the_altitude_to_set_is_safe_within_all_limits_and_hardly_too_high(autop
     assert (set_to.set_rel_home_m, set_to.no_return_m) == (best, 0.0)
 
 
+@pytest.mark.slow
 def test_the_headline_tells_path_and_return_and_counts_overlaps_once() -> None:
     w = world(ridge)
     v = vehicle(**BARE)

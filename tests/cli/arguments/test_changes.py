@@ -88,6 +88,7 @@ def test_a_text_that_is_no_wind_is_refused_with_the_forms(text: str) -> None:
         wind_changes(text)
 
 
+@pytest.mark.slow
 def test_a_wind_of_a_run_is_named_and_saved_in_place_of_the_files(run: Any, tmp_path: Path) -> None:
     file = tmp_path / "field.yaml"
     file.write_text(mission() + "wind: {up_to_m_s: 3, varying: true}  # calm\n")
@@ -107,6 +108,7 @@ def test_an_option_that_counts_once_is_refused_twice() -> None:
         given(max_agl=["80", "90"])
 
 
+@pytest.mark.slow
 def test_plan_names_each_change_and_saves_it_on_request(run: Any, tmp_path: Path) -> None:
     file = tmp_path / "field.yaml"
     file.write_text("# mine\n" + mission())

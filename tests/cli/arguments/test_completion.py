@@ -99,6 +99,7 @@ print([name for name in heavy if name in sys.modules])
     assert done.stdout == "[]\n"
 
 
+@pytest.mark.slow
 def test_a_command_is_made_without_the_options_of_the_others() -> None:
     every = set(main.command_of("").commands)
     assert {"plan", "fit-energy", "dem"} <= every

@@ -13,6 +13,7 @@ from gcsplan.cli.commands.bench import bench_app
 from gcsplan.research.bench import functions
 
 
+@pytest.mark.slow
 def test_legs_are_checked_and_told_in_words_or_as_a_document(run: Any) -> None:
     code, out, _ = run("bench", "check", "--legs", 500, "--seed", 3, "--json")
     assert code == 0

@@ -43,6 +43,7 @@ def run(run: Any, tmp_path: Path) -> Any:
     return run
 
 
+@pytest.mark.slow
 def test_from_nothing_to_a_plan_by_the_commands_that_are_told(run: Any, served: Served, tmp_path: Path) -> None:
     code, _, err = run("plan", "ridge.yaml")
     assert code == 2
@@ -82,6 +83,7 @@ def test_a_mission_is_fetched_by_its_file(run: Any, served: Served) -> None:
     ]  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_place_is_fetched_with_the_area_around_it(run: Any, served: Served) -> None:
     code, out, _ = run("dem", "fetch", "--around", "36°30'N 84°00'W", "--radius-km", 3)
     assert code == 0

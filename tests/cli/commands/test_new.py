@@ -102,6 +102,7 @@ def test_a_raster_is_named_from_the_mission_s_folder_and_json_says_what_was_writ
     assert new.beside("sample:jacksboro", Path("missions/a.yaml")) == "sample:jacksboro"
 
 
+@pytest.mark.slow
 def test_a_vehicle_tells_start_autopilot_and_settings(run: Any, tmp_path: Path) -> None:
     vehicle = LoopbackVehicle(
         3, Autopilot.ARDUCOPTER, lat_deg=36.6175, lon_deg=-84.3892, amsl_m=399.0,
@@ -154,6 +155,7 @@ def test_on_a_terminal_what_is_missing_is_asked_for(run: Any, tmp_path: Path, te
     assert request.start == pytest.approx((request.start[0], request.start[1], 310.0))
 
 
+@pytest.mark.slow
 def test_several_vehicles_zones_a_battery_and_a_ceiling_stand_in_the_file(run: Any, tmp_path: Path) -> None:
     zone = {"type": "Polygon", "coordinates": [[[-84.35, 36.65], [-84.34, 36.65], [-84.34, 36.66], [-84.35, 36.65]]]}
     feature = {"type": "Feature", "properties": {"name": "wood"}, "geometry": zone}

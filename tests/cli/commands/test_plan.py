@@ -14,6 +14,7 @@ from tests.support.batches import mission
 from tests.support.crossing import CROSSING, OUTPUTS, vehicle
 
 
+@pytest.mark.slow
 def test_plan_writes_its_outputs_into_a_directory_of_the_missions_name(run: Any, tmp_path: Path) -> None:
     code, out, err = run("plan", CROSSING)
     assert code == 0
@@ -56,6 +57,7 @@ def test_a_vehicle_that_stands_elsewhere_is_refused_unless_that_is_ignored(run: 
         assert run("plan", CROSSING, "--upload", server.url_for_gcs, "--ignore-position")[0] == 0
 
 
+@pytest.mark.slow
 def test_the_wrong_autopilot_is_refused(run: Any) -> None:
     with SimServer([vehicle(Autopilot.PX4)], "udpin:127.0.0.1:0", speedup=10.0) as server:
         code, _, err = run("plan", CROSSING, "--upload", server.url_for_gcs)

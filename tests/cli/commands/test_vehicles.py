@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+import gcsplan
 from gcsplan.mavlink.files.formats import read_mission_file
 from gcsplan.sim.vehicle.loopback import LoopbackVehicle
 from gcsplan.sim.vehicle.server import SimServer
@@ -19,15 +21,23 @@ LAT, LON, ALT = 8, 9, 10
 Change = Callable[[list[str]], None]
 
 
+@pytest.fixture(scope="module")
+def planned(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a plan."""
+    folder = tmp_path_factory.mktemp("planned") / "out"
+    gcsplan.write(gcsplan.plan(CROSSING), folder)
+    return folder
+
+
 @pytest.fixture
-def run(run: Any) -> Any:
-    """`run` of the folder after a plan; gives (exit code, all text in one line)."""
+def run(run: Any, planned: Path) -> Any:
+    """`run` in a folder with a plan in ``out``; gives (exit code, all text in one line)."""
 
     def call(*arguments: object) -> tuple[int, str]:
         code, out, err = run(*arguments)
         return code, " ".join((out + err).split())
 
-    assert call("plan", CROSSING, "-o", "out")[0] == 0
+    shutil.copytree(planned, "out")
     return call
 
 
@@ -102,6 +112,7 @@ def test_what_is_on_board_is_judged_and_not_the_file(run: Any, url: str) -> None
     assert "judged again: not safe" in said
 
 
+@pytest.mark.slow
 def test_another_number_is_a_difference_whatever_the_tolerance(run: Any, url: str) -> None:
     def wait(row: list[str]) -> None:
         cut(row)
@@ -114,6 +125,7 @@ def test_another_number_is_a_difference_whatever_the_tolerance(run: Any, url: st
     assert "--tolerance-m is for positions alone" in said
 
 
+@pytest.mark.slow
 def test_a_mission_of_another_place_is_a_difference_and_no_crash(run: Any, url: str) -> None:
     def far(row: list[str]) -> None:
         row[LAT], row[LON] = str(-float(row[LAT])), "120.5"
@@ -153,6 +165,7 @@ def test_options_that_do_not_go_together_are_refused(run: Any, options: tuple[ob
     assert words in said
 
 
+@pytest.mark.slow
 def test_another_autopilot_than_the_mission_files_is_refused(run: Any) -> None:
     board = LoopbackVehicle(1, Autopilot.PX4, lat_deg=36.6, lon_deg=-84.38, amsl_m=471.0)
     with SimServer([board], "udpin:127.0.0.1:0", speedup=10.0) as server:

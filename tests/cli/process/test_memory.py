@@ -67,6 +67,7 @@ def test_a_leg_over_flat_ground_imports_no_file_reader_and_no_separation(tmp_pat
     assert used & (SENDS_OR_DRAWS | READS_FILES_OR_A_FLEET) == set()
 
 
+@pytest.mark.slow
 def test_the_version_is_told_without_what_reads_other_options() -> None:
     assert imported_by("--version") & {"numpy", "pydantic", "rich.console", "yaml"} == set()
 

@@ -38,7 +38,7 @@ cli.main()
 """
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 @pytest.mark.parametrize(("number", "code"), [("SIGTERM", 143), ("SIGINT", 130), ("SIGHUP", 129)])
 def test_a_signal_ends_a_command_in_the_middle_of_a_library(number: str, code: int, tmp_path: Path) -> None:
@@ -62,6 +62,7 @@ def test_a_signal_ends_a_command_in_the_middle_of_a_library(number: str, code: i
     assert err.count("\n") == 1
 
 
+@pytest.mark.slow
 def test_a_process_that_runs_many_commands_listens_once() -> None:
     many = """
 import os, sys, threading
@@ -123,6 +124,7 @@ class Sends:
     )  # fmt: skip
 
 
+@pytest.mark.first_quick
 @pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 @pytest.mark.parametrize(
     "module", ["gcsplan.cli.process.exit", "gcsplan.cli.command_table", "typer", "gcsplan.cli.commands.dem"]
@@ -134,6 +136,7 @@ def test_ctrl_c_while_modules_are_imported_is_quiet(module: str) -> None:
     assert ended.stderr in ("", "gcsplan: interrupted\n")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 def test_the_exit_code_is_the_signal_s_though_python_executes_a_text() -> None:
     """As dataclasses are made while modules are imported: Python would then end as if by Ctrl-C."""

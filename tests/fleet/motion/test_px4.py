@@ -15,6 +15,7 @@ from gcsplan.fleet.motion.timing import at_own_speed
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.geometry.limits import Limits
 from tests.oracles.px4_smoothing import fly
+from tests.support.effort import seeds
 
 RADIUS_M = 3.0
 
@@ -36,6 +37,7 @@ def zigzag(turn_deg: float, leg_m: float, legs: int = 4) -> Floats:
     return np.vstack([[0.0, 0.0, 90.0], np.array([0.0, 0.0, 90.0]) + np.cumsum(steps, axis=0)])
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize(("turn_deg", "leg_m", "speed"), [
     (0.0, 60.0, 10.0), (19.5, 60.0, 10.0), (19.5, 50.0, 5.0), (45.0, 120.0, 12.0), (90.0, 40.0, 8.0),
     (120.0, 80.0, 10.0), (60.0, 15.0, 8.0), (20.0, 30.0, 12.0),
@@ -47,6 +49,7 @@ def test_a_step_by_step_flight_takes_as_long(turn_deg: float, leg_m: float, spee
     assert stretch(points).time_s(speed) == pytest.approx(flown_s, abs=0.2 + 0.3 * corners, rel=0.0)
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("turn_deg", [10.0, 19.5, 45.0, 90.0])
 def test_a_corner_is_flown_at_the_speed_that_its_angle_and_radius_allow(turn_deg: float) -> None:
     points = zigzag(turn_deg, 150.0, 2)
@@ -83,7 +86,7 @@ def random_points(rng: np.random.Generator) -> Floats:
     return np.vstack([[0.0, 0.0, 100.0], np.array([0.0, 0.0, 100.0]) + np.cumsum(steps, axis=0)])
 
 
-@pytest.mark.parametrize("seed", range(15))
+@pytest.mark.parametrize("seed", seeds(3, 3, 15))
 def test_whatever_is_flown_the_motion_is_whole_and_faster_is_never_later(seed: int) -> None:
     points = random_points(np.random.default_rng(seed))
     way, legs = stretch(points), len(points) - 1

@@ -36,7 +36,7 @@ def hills(height_m: float, wave_m: float) -> Callable[[float], float]:
     return lambda x: height_m * math.sin(2.0 * math.pi * x / wave_m)
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("speed_m_s", [5.0, 9.0, 15.0])
 @pytest.mark.parametrize(("height_m", "wave_m"), [(30.0, 700.0), (20.0, 300.0), (60.0, 1500.0)])
 def test_hills_are_flown_in_the_time_of_the_autopilots_own_rule(
@@ -47,6 +47,7 @@ def test_hills_are_flown_in_the_time_of_the_autopilots_own_rule(
     assert float(seconds(ground, length_m, speed_m_s).sum()) == pytest.approx(flown_s, rel=0.012)
 
 
+@pytest.mark.nightly
 def test_times_were_two_percent_late_on_steep_ground() -> None:
     ground, length_m = hills(20.0, 300.0), 6000.0
     flown_s, _ = fly(ground, length_m, 9.0)
@@ -72,6 +73,7 @@ def test_gentle_ground_and_parts_that_follow_none_are_flown_at_full_speed() -> N
     assert steep == pytest.approx(np.full(4, 2.5))
 
 
+@pytest.mark.nightly
 def test_no_speed_makes_it_later() -> None:
     ground = hills(25.0, 400.0)
     times = [float(seconds(ground, 4000.0, v).sum()) for v in np.arange(3.0, 20.0, 0.5).tolist()]

@@ -181,7 +181,7 @@ def inside_in_degrees(lat: float, lon: float, ring: list[tuple[float, float]]) -
     return crossings % 2 == 1
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("far", [0.01, 0.5, 3.0, 30.0, 84.3, 90.0, 95.0])
 def test_a_fences_edges_are_straight_in_degrees_however_far_its_corners_are(far: float) -> None:
     """The plane bends long edges by hundreds of metres, and has no place for what is a quarter of the globe away."""
@@ -285,6 +285,7 @@ def job_of(name: str, sysid: int, url: str, mission: Mission, craft: Vehicle, wh
     return uploads.UploadJob(name, url, mission, judge(mission, craft, where), craft, where)
 
 
+@pytest.mark.slow
 def test_fences_go_before_missions_and_an_absent_vehicle_stops_nobody_else(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

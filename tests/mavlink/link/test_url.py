@@ -106,6 +106,7 @@ def test_a_very_long_link_is_not_repeated_whole() -> None:
     assert len(str(refused.value)) < 600
 
 
+@pytest.mark.slow
 @settings(max_examples=draws(500))
 @given(
     st.one_of(

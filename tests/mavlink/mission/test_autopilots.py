@@ -175,6 +175,7 @@ ITEMS = st.builds(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=draws(400))
 @given(ITEMS, st.sampled_from(ARDUPILOTS))
 def test_ardupilots_rules_agree_with_an_independent_reading_of_its_source(

@@ -100,6 +100,7 @@ def test_what_is_written_is_read(tmp_path: Path, ones: list[tuple]) -> None:  # 
 # -- arcs
 
 
+@pytest.mark.slow
 @given(
     st.floats(-65, 65), st.floats(-180, 180), st.floats(300.0, 90_000.0), st.integers(0, 359), st.integers(20, 340),
     st.booleans(), st.booleans(),

@@ -118,6 +118,7 @@ def test_a_zone_with_times_is_left_out_by_name_and_only_outside_them(tmp_path: P
         mission(tmp_path, WEEKLY, at="10:00")
 
 
+@pytest.mark.slow
 def test_a_flight_that_outlasts_the_hours_is_refused(tmp_path: Path) -> None:
     short = mission(tmp_path, WEEKLY, at=["2026-11-23T18:01Z", "2026-11-23T18:03Z"])
     with pytest.raises(InputError, match=r"but uav1 flies from 2026-11-23 18:01Z to 2026-11-23 18:0[5-9]Z; write at:"):

@@ -112,6 +112,7 @@ def test_the_examples_of_messages_are_one_of_each_format() -> None:
     assert [apart_m(degrees(text), first) < 25_000.0 for text in PLACE_EXAMPLES] == [True] * 5
 
 
+@pytest.mark.slow
 @settings(max_examples=draws(300))
 @given(st.integers(-9_000_000_000, 9_000_000_000), st.integers(-18_000_000_000, 18_000_000_000), st.integers(0, 8))
 def test_decimal_degrees_are_exact_to_the_digit(lat: int, lon: int, digits: int) -> None:
@@ -141,6 +142,7 @@ def test_sexagesimal_degrees_are_exact_to_the_digit(
     assert degrees(text) == (float(Fraction(lat, 3_600_000)), float(Fraction(lon, 3_600_000)))
 
 
+@pytest.mark.slow
 @settings(max_examples=draws(300))
 @given(LATS, LONS, st.booleans())
 def test_utm_is_that_of_a_second_implementation(lat: float, lon: float, band: bool) -> None:
@@ -151,6 +153,7 @@ def test_utm_is_that_of_a_second_implementation(lat: float, lon: float, band: bo
     assert apart_m(degrees(text), (lat, lon)) < 0.01
 
 
+@pytest.mark.slow
 @settings(max_examples=draws(300))
 @given(LATS, LONS, st.integers(1, 5))
 def test_mgrs_is_the_square_of_a_second_implementation(lat: float, lon: float, digits: int) -> None:
@@ -252,6 +255,7 @@ def test_what_is_no_place_is_refused_with_its_format_and_an_example_that_works(t
         read_place(example)
 
 
+@pytest.mark.slow
 @settings(max_examples=draws(500))
 @given(st.text(st.sampled_from("0123456789.,:;/ +-°'\"NSEWTMUZdeg′″\u00a0"), max_size=40) | st.text(max_size=120))
 def test_any_text_is_a_place_on_earth_or_refused_with_a_cure(text: str) -> None:

@@ -77,6 +77,7 @@ def test_knots_kilometres_per_hour_and_feet_are_understood() -> None:
     assert (made.heights_m[0], made.most_m_s, made.gust_m_s) == pytest.approx((30.48, 10.0, 20.0))
 
 
+@pytest.mark.slow
 @given(st.floats(0.1, 70), st.floats(0, 4.9), st.floats(0, 360), st.floats(0, 179))
 def test_an_error_is_the_range_around_the_number(speed: float, more: float, turn: float, error: float) -> None:
     speed, more, turn, error = round(speed, 3), round(more, 3), round(turn, 3), round(error, 3)

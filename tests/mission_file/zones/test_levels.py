@@ -155,6 +155,7 @@ SOUP = st.lists(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=draws(400))
 @given(SOUP, st.sampled_from([" ", "  ", "\t"]), st.booleans())
 def test_words_that_leave_a_choice_are_no_level(words: list[str], gap: str, lower: bool) -> None:
@@ -225,6 +226,7 @@ ANY_UNIT = st.sampled_from(["M", "FT"])
 ANY_REFERENCE = st.sampled_from(["AMSL", "AGL", "MSL", "SFC"])
 
 
+@pytest.mark.slow
 @settings(max_examples=draws(150), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data(), NUMBERS, ANY_UNIT, ANY_REFERENCE, st.sampled_from(["floor", "ceiling"]), st.booleans())
 def test_every_spelling_of_a_level_gives_the_same_zone(

@@ -26,6 +26,7 @@ def desk(tmp_path: Path) -> Iterator[Desk]:
         yield desk
 
 
+@pytest.mark.slow
 def test_a_second_vehicle_is_planned_saved_and_arrives_in_its_turn(desk: Desk, tmp_path: Path) -> None:
     found = desk.ask("change", "plan", changes={"vehicles[1]": SECOND, **APART})
     rows = found["fleet"]["rows"]
@@ -44,6 +45,7 @@ def test_a_second_vehicle_is_planned_saved_and_arrives_in_its_turn(desk: Desk, t
     assert [v["length_m"] for v in found["vehicles"]] == [own.verdict.length_m, other.verdict.length_m]
 
 
+@pytest.mark.slow
 def test_only_the_vehicle_that_is_dragged_is_planned_meanwhile(desk: Desk) -> None:
     desk.ask("change", "plan", changes={"vehicles[1]": SECOND, **APART})
     desk.heard.clear()
@@ -102,6 +104,7 @@ def test_a_fleet_in_the_file_is_shown_as_it_is(tmp_path: Path) -> None:
         assert first["arrive_s"] == pytest.approx(second["arrive_s"], abs=0.02)
 
 
+@pytest.mark.slow
 def test_one_vehicle_has_a_view_in_space_and_no_time_table(tmp_path: Path) -> None:
     (tmp_path / "field.yaml").write_text(FLAT)
     planned = plan(load_mission(tmp_path / "field.yaml"))

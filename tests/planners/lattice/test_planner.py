@@ -75,6 +75,7 @@ def test_crosses_real_ground_between_60_and_120_m(seed: int, degrees: float) -> 
     assert straight_bound(p) <= path.length_m <= 1.15 * straight_bound(p)
 
 
+@pytest.mark.nightly
 def test_a_plan_is_the_same_every_time_and_tells_of_its_progress() -> None:
     told: list[Progress] = []
     p = replace(band_mission(4, 15.0), progress=told.append)
@@ -116,6 +117,7 @@ def test_a_path_with_two_points_at_one_place_has_sides() -> None:
     assert sides_to_pass(problem, points, *pins_of(problem, points)) == {0: True, 1: False}
 
 
+@pytest.mark.nightly
 def test_vias_are_passed_at_their_altitudes() -> None:
     p = band_mission(6, 15.0)
     middle = 0.5 * (np.array(p.start[:2]) + np.array(p.goal[:2])) + 400.0
@@ -248,6 +250,7 @@ def test_start_and_goal_over_one_place(down: bool) -> None:
     assert np.allclose(solution.path.points[[0, -1]], [p.start, p.goal])
 
 
+@pytest.mark.nightly
 def test_no_room_to_climb_over_one_place_is_refused_with_its_limit() -> None:
     limits = replace(STEEP, max_climb_deg=2.0)
     walls = [Zone(f"wall {k}", Circle(500.0 + 60.0 * x, 1000.0 + 60.0 * y, 52.0)) for k, (x, y) in enumerate(AROUND)]

@@ -77,6 +77,7 @@ def test_straight_line_where_nothing_stands_in_the_way() -> None:
     assert s.lower_bound == pytest.approx(1600.0)
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("objective", ["length", "energy"])
 @pytest.mark.parametrize("ceiling", [None, Level(300.0, "amsl"), Level(300.0, "agl")])
 def test_a_cylinder_too_high_to_fly_over_is_as_one_without_a_top(objective: str, ceiling: Level | None) -> None:
@@ -86,6 +87,7 @@ def test_a_cylinder_too_high_to_fly_over_is_as_one_without_a_top(objective: str,
     assert s.path.length_m == pytest.approx(tangent_length(800.0, 150.0), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_a_cylinder_that_is_cheaper_to_fly_over_is_flown_over() -> None:
     zone = Zone("tower", Circle(1000.0, 1000.0, 600.0), None, Level(120.0, "amsl"))
     s = solve(problem(ground(0.0), (zone,), climbing(60.0)))
@@ -205,12 +207,14 @@ def test_zones_one_over_the_other_are_passed_in_between() -> None:
     assert s.path.length_m == pytest.approx(1800.0 + 2.0 * math.hypot(50.0, 40.0), abs=0.01)
 
 
+@pytest.mark.slow
 def test_start_under_a_zones_floor_is_legal() -> None:
     roof = Zone("airway", Circle(200.0, 1000.0, 300.0), Level(50.0, "agl"), None)
     s = solve(problem(ground(0.0), (roof,), goal=(1800.0, 1000.0, 400.0)))
     assert np.interp(490.0, s.path.points[:, 0], s.path.points[:, 2]) <= 50.0
 
 
+@pytest.mark.slow
 def test_via_points_are_passed_in_order_and_at_their_heights() -> None:
     mast = Zone("mast", Circle(1000.0, 1000.0, 300.0))
     p = problem(ground(0.0), (mast,), via=(Via(1000.0, 1500.0), Via(1500.0, 600.0, 80.0)))
@@ -249,7 +253,7 @@ def test_climb_limit_is_kept_by_climbing_early_and_by_a_longer_way() -> None:
     assert s.path.length_m > 1150.0
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("error_m", [0.0, 2.0])
 def test_a_zone_as_high_as_the_ceiling_is_passed_over_at_just_that_height(error_m: float) -> None:
     lid = Zone("lid", Circle(1000.0, 1000.0, 300.0), None, Level(100.0, "amsl"))
@@ -283,6 +287,7 @@ def test_progress_tells_phase_and_cost() -> None:
     assert [x.elapsed_s for x in said] == sorted(x.elapsed_s for x in said)
 
 
+@pytest.mark.slow
 def test_spent_budget_still_gives_a_safe_path_and_says_so() -> None:
     s = solve(replace(random_mission(5), budget_s=0.0, gap_percent=1e-6))
     assert s.stopped_by in ("budget", "time")
@@ -319,7 +324,7 @@ def test_random_missions_under_the_120_m_rule(seed: int) -> None:
     assert faults_of_plan(random_mission(seed, replace(FIELD, min_agl_m=50.0, max_agl_m=120.0), zones=6)) == []
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [40, 42, pytest.param(44, marks=pytest.mark.slow)])
 def test_random_missions_under_a_ceiling(seed: int) -> None:
     assert faults_of_plan(random_mission(seed, replace(FIELD, max_amsl_m=690.5))) == []

@@ -91,6 +91,7 @@ def test_a_ceiling_that_shuts_the_whole_model_is_still_proved_to() -> None:
     assert "not found within" not in caught.value.message
 
 
+@pytest.mark.slow
 def test_where_memory_ends_before_the_terrain_nothing_is_called_proved() -> None:
     problem = problem_of(source_of(ROW_4), budget_mb=1.0)
     with pytest.raises(Refusal) as caught:
@@ -130,6 +131,7 @@ def test_a_raster_tells_on_which_sides_it_goes_on() -> None:
     assert wide.wider(math.inf, 10**6) is None
 
 
+@pytest.mark.slow
 def test_a_wider_window_is_as_wide_as_asked_the_same_for_all_and_never_too_large() -> None:
     source = source_of(ROW_4)
     assert source.wider is not None

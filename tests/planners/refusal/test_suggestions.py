@@ -129,7 +129,7 @@ def tier(name: str) -> list[pytest.MarkDecorator]:
     return [pytest.mark.nightly] if name in NIGHTLY else [pytest.mark.slow] if name in SLOW else []
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [pytest.param(name, marks=tier(name)) for name in MISSIONS_REFUSED])
 def test_what_is_reported_to_help_does(name: str) -> None:
     problem = MISSIONS_REFUSED[name]
@@ -167,6 +167,7 @@ def test_a_mission_file_with_the_reported_value_has_a_mission(
     assert pipeline.plan(mission).vehicles[0].verdict.safe is not False
 
 
+@pytest.mark.slow
 def test_a_ceiling_is_reported_close_to_the_lowest_that_does() -> None:
     problem = MISSIONS_REFUSED["wall under the ceiling"]
     (value,) = [float(v) for k, v in LIMIT.findall(refusal_of(problem).message) if k == "max_amsl_m"]
@@ -234,7 +235,7 @@ def test_a_plan_that_runs_on_is_stopped_when_it_reports_progress(monkeypatch: py
     assert "not tried in 3 s: without max_climb_deg and max_descent_deg, max_agl_m, the no-fly zones or" in message
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("opens", [lambda p: True, lambda p: False, lambda p: p.limits.max_amsl_m is None])
 def test_so_many_plans_and_no_more(opens: Callable[[Problem], bool], monkeypatch: pytest.MonkeyPatch) -> None:
     slow = SlowPlan(0.0, opens)
@@ -242,6 +243,7 @@ def test_so_many_plans_and_no_more(opens: Callable[[Problem], bool], monkeypatch
     assert 4 <= slow.asked <= MOST_TRIALS + 3 * WHOLE  # three limits have values
 
 
+@pytest.mark.slow
 def test_a_value_that_was_tried_in_vain_is_not_reported_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
     slow = SlowPlan(0.0, lambda p: p.limits.max_amsl_m is None)
     message = cures_of(many_limits(), slow, monkeypatch).message

@@ -247,6 +247,7 @@ def test_paths_between_hills_are_rounded_and_climb_no_steeper_than_allowed(seed:
         assert found.cost < 1.05 * Path(points).length_m
 
 
+@pytest.mark.slow
 def test_what_is_known_of_a_belt_is_exactly_what_looking_anew_at_its_like_tells() -> None:
     problem = replace(hills(0, 145.0), turn_radius_m=100.0)
     points = way_below(problem)
@@ -262,6 +263,7 @@ def test_what_is_known_of_a_belt_is_exactly_what_looking_anew_at_its_like_tells(
                 assert near.risen.way_points == pytest.approx(anew.risen.way_points, abs=1e-5)
 
 
+@pytest.mark.slow
 def test_a_via_is_passed_exactly_at_its_altitude_and_is_a_way_point() -> None:
     corners = at_100((500, 500), (2500, 3000), (4300, 700))
     corners[1, 2] = 130.0
@@ -275,6 +277,7 @@ def test_a_via_is_passed_exactly_at_its_altitude_and_is_a_way_point() -> None:
     assert np.linalg.norm(found.flown - corners[1], axis=1).min() < 1e-6
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("aside_m", [0.0, 1e-7, 1.0, 50.0])
 def test_a_via_on_a_nearly_straight_way_is_passed_at_its_altitude(aside_m: float) -> None:
     corners = at_100((500, 500), (1500, 500 + aside_m), (2500, 500))
@@ -302,6 +305,7 @@ def test_vias_less_than_two_radii_apart_are_both_passed_with_a_detour(apart_m: f
     assert np.argmin(near[0]) < np.argmin(near[1])
 
 
+@pytest.mark.slow
 def test_a_via_within_a_turn_radius_of_the_start_is_passed_with_a_detour() -> None:
     corners = at_100((1000, 1000), (940, 1000), (3000, 1000))
     problem = problem_of(corners, via=(Via(940.0, 1000.0, None),))
@@ -311,7 +315,7 @@ def test_a_via_within_a_turn_radius_of_the_start_is_passed_with_a_detour() -> No
     assert np.hypot(*(curve.points[:, :2] - corners[1, :2]).T).min() < 0.51
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("goal", [(500.0, 900.0), (500.0, 520.0), (900.0, 500.0)])
 def test_a_via_is_passed_even_where_the_way_goes_straight_back(goal: tuple[float, float]) -> None:
     corners = at_100((500, 500), (3500, 500), goal)
@@ -332,6 +336,7 @@ def test_a_straight_path_stays_as_it_is() -> None:
     assert found.cost == pytest.approx(Path(corners).length_m)
 
 
+@pytest.mark.slow
 def test_the_arc_passes_where_the_corner_was_and_the_way_point_lies_outside_of_it() -> None:
     corners = at_100((500, 500), (2000, 2000), (3500, 500))
     wall = [Zone(f"post {k}", Circle(2000.0, 1970.0 - 50.0 * k, 30.0 - 0.1 * k)) for k in range(40)]
@@ -343,6 +348,7 @@ def test_the_arc_passes_where_the_corner_was_and_the_way_point_lies_outside_of_i
     assert float(found.way_points[:, 1].max()) == pytest.approx(2000.0 + 100.0 * (math.sqrt(2.0) - 1.0), abs=5.0)
 
 
+@pytest.mark.slow
 def test_energy_counts_climb_and_horizontal_metres_along_the_arcs() -> None:
     corners = at_100((500, 500), (2000, 2000), (3500, 500))
     corners[-1, 2] = 160.0
@@ -372,6 +378,7 @@ def through_the_walls(gap_m: float) -> Floats:
     return at_100((500, 2000 + middle), (x, 2000 + middle), (x, 2300 + middle), (4500, 2300 + middle))
 
 
+@pytest.mark.slow
 def test_a_passage_too_narrow_for_the_radius_is_refused_and_flown_with_a_small_one(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -385,6 +392,7 @@ def test_a_passage_too_narrow_for_the_radius_is_refused_and_flown_with_a_small_o
     assert problem.airspace.examine(widened(small, found), LIMITS).violations == ()
 
 
+@pytest.mark.slow
 def test_where_a_path_cannot_be_rounded_one_with_more_room_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(planner, "TRIES", 20)
     corners = through_the_walls(60.0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from gcsplan.report.parts.page_data import (
     LIGHT_SAMPLES,
@@ -31,6 +32,7 @@ def with_room(subject: Subject, min_agl_m: float) -> Subject:
     return replace(subject, verdict=replace(subject.verdict, legs=legs))
 
 
+@pytest.mark.slow
 def test_of_a_larger_fleet_those_with_problems_and_least_room_are_shown() -> None:
     page = many_page(MOST_WHOLE + 1)
     rng = np.random.default_rng(1)

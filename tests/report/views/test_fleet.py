@@ -54,6 +54,7 @@ def test_the_nearest_two_over_time_are_those_of_all_pairs() -> None:
         assert np.allclose(found, brute, equal_nan=True)
 
 
+@pytest.mark.nightly
 def test_a_fleets_report_tells_the_exact_separation_and_draws_it_over_time() -> None:
     page = fleet_page()
     read = Reader(render_page(page))
@@ -70,6 +71,7 @@ def test_a_fleets_report_tells_the_exact_separation_and_draws_it_over_time() -> 
     assert {s["name"] for s in charts["distance"]["series"]} == {"uav1", "uav2"}
 
 
+@pytest.mark.nightly
 def test_the_key_figures_of_a_large_fleet_stand_in_one_table() -> None:
     page = small_page()
     first = page.subjects[0]

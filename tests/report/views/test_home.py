@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import pytest
+
 from gcsplan.check.returns.way_home import way_home
 from gcsplan.report.page import render_page
 from tests.support.pages import (
@@ -12,6 +14,7 @@ from tests.support.pages import (
 )
 
 
+@pytest.mark.nightly
 def test_the_way_home_is_drawn_and_told_at_the_top_where_it_is_not_safe() -> None:
     page = small_page()
     subject = page.subjects[0]

@@ -48,7 +48,7 @@ def test_the_map_has_the_reports_colours_low_ground_is_no_lake() -> None:
     assert float(np.mean((blue > green + 20) & (blue > red + 20))) < 0.001
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize(("form", "begins"), [("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF")])
 def test_a_picture_of_each_form_has_the_same_bytes_again(form: str, begins: bytes) -> None:
     small = plan(FLAT)

@@ -116,6 +116,7 @@ def test_a_checked_file_has_no_replay_and_one_vehicle_has_one() -> None:
 # -- what its script computes -------------------------------------------------------------------------------------
 
 
+@pytest.mark.nightly
 @in_node
 def test_the_script_finds_every_vehicle_where_its_motion_is_and_the_nearest_other() -> None:
     motions = [wavy(k, 40, f"uav{k}") for k in range(4)]
@@ -197,6 +198,7 @@ def test_a_place_that_is_passed_twice_is_found_by_its_time() -> None:
         assert found == round(since)
 
 
+@pytest.mark.nightly
 @in_node
 def test_the_pointer_finds_the_nearest_track_between_its_samples_too() -> None:
     rng = np.random.default_rng(5)

@@ -33,6 +33,7 @@ from tests.support.pages import (
 )
 
 
+@pytest.mark.nightly
 def test_the_legs_of_the_table_are_those_of_the_verdict() -> None:
     page = Reader(planned_page())
     legs = pages.planned().vehicles[0].verdict.legs

@@ -213,6 +213,7 @@ def test_partners_differ_from_each_other_and_from_oneself(n: int, k: int, seed: 
     assert drawn.max() < n
 
 
+@pytest.mark.slow
 def test_partners_are_uniform() -> None:
     rng = np.random.default_rng(2)
     counts = np.zeros((4, 4), dtype=int)

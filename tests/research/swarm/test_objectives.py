@@ -185,7 +185,7 @@ def cost_of(name: str, p: Problem, points: int = 6) -> Cost:
     return Cost(p, Code.of("box", Scene.of(p), points), OBJECTIVES[name])
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["ssgwo", "msfoa", "ib-abc", "abo"])
 def test_terms_are_those_of_the_equations(name: str) -> None:
     p = problem()

@@ -45,6 +45,7 @@ def toy(limits: Limits = LIMITS, **options: object) -> Problem:
     return Problem(air, limits, (*a, float(low[0])), (*b, float(low[1])), options=options)
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("name", SWARMS)
 def test_every_swarm_solves_a_toy_map_and_says_what_it_did(name: str) -> None:
     if name == "cmaes":
@@ -69,12 +70,14 @@ def test_every_encoding_and_cost_go_together(encoding: str) -> None:
         assert violations(problem, get("de").plan(problem).path.points) == ()
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_bytes_and_another_seed_another_path() -> None:
     problem = toy(encoding="sections", iterations=20)
     plans = [get("ib-abc").plan(replace(problem, seed=s)).path.points for s in (1, 1, 2)]
     assert plans[0].tobytes() == plans[1].tobytes() != plans[2].tobytes()
 
 
+@pytest.mark.slow
 def test_a_cost_that_sees_nothing_cannot_pass_a_path_through_a_zone(monkeypatch: pytest.MonkeyPatch) -> None:
     """With a cost that sees no obstacles every curve seems free, and the straight one seems best."""
     problem = toy(encoding="sections", points=3, iterations=30, population=30)
@@ -150,6 +153,7 @@ def test_searches_end_with_the_budget_or_their_number(
     assert (f"({len(luck.seeds)} searches" in str(refusal.value)) == (len(luck.seeds) > 1)
 
 
+@pytest.mark.slow
 def test_few_way_points_stay_within_the_corridor_of_the_curve() -> None:
     problem = toy(encoding="bspline", points=4, cost="krill")
     found = search(problem, "de", Settings.of(SWARM_PLANNERS["de"], problem.options))

@@ -25,7 +25,7 @@ def at(command: int, east: float, north: float = 0.0, up: float = 100.0, p1: flo
 
 
 @pytest.mark.nightly_but("left-5.0", "half-15.0", "climbing-5.0", "spline-15.0")
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("speed_m_s", [5.0, pytest.param(15.0, marks=pytest.mark.slow)])
 @pytest.mark.parametrize(
     "curve",

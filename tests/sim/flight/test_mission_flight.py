@@ -79,7 +79,7 @@ def test_a_steep_leg_is_flown_as_slowly_as_climb_and_descent_demand(rise_m: floa
     assert flown.arrive_s[0] == pytest.approx(300 / 2.5 + 2.5 + length_m / v + v / 1.5, abs=0.05)
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("leg_m", "measured_m_s"),
     [(12.0, 3.08), (22.9, 4.80), (38.8, 6.93), (49.7, 8.17), (60.7, 9.20), (70.3, 10.1)],
@@ -126,6 +126,7 @@ def test_a_loiter_without_end_ends_in_the_air_and_what_follows_is_never_flown() 
     assert flown.points(0)[-1, 2] == pytest.approx(GROUND_M + 50, abs=0.01)
 
 
+@pytest.mark.nightly
 def test_the_ideal_vehicle_of_the_papers_flies_length_over_speed() -> None:
     ideal = replace(
         COPTER, accel_m_s2=math.inf, corner_accel_m_s2=math.inf, vertical_accel_m_s2=math.inf, climb_m_s=math.inf,

@@ -19,6 +19,7 @@ from tests.support import worlds
 from tests.support.short_flights import CLIMB_S, COPTER, GROUND_M, TAKEOFF, at, speed, speed_at, track
 
 
+@pytest.mark.nightly
 def test_a_right_angle_is_rounded_two_metres_off_at_the_speed_of_the_arc() -> None:
     way = track(TAKEOFF, at(cmd.WAYPOINT, 0, 500, 50), at(cmd.WAYPOINT, 500, 500, 50))
     nearest_m = np.linalg.norm(way.points - [0, 500, GROUND_M + 50], axis=1).min()

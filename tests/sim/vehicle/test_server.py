@@ -190,6 +190,7 @@ def test_stopping_twice_and_starting_again() -> None:
             _ = server.address
 
 
+@pytest.mark.slow
 def test_serving_ends_quietly_when_interrupted() -> None:
     # A test run in the background may have been told to ignore interrupts, which children inherit.
     program = """

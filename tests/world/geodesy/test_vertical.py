@@ -49,7 +49,7 @@ def is_times(surface: Surface, heights: Any, metres: float) -> bool:
     )
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("code", UPWARDS)
 def test_a_vertical_code_has_its_unit_wherever_it_stands(tmp_path: Path, code: int) -> None:
     metres, name = UPWARDS[code]
@@ -130,7 +130,7 @@ NAVD88_SHIFTED = (
 )
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("vertical", "words"),
     [
@@ -187,6 +187,7 @@ def test_the_unit_of_heights_of_an_arcinfo_prj(tmp_path: Path, zunits: str, metr
     assert np.nanmax(load(path, height_unit="us_ft").ground_m) == pytest.approx(700.0 * US_FOOT)
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("code", [*DEPTHS[:3], *OTHER_ZEROS[:3]])
 def test_a_key_for_the_grid_does_not_change_what_the_file_says_of_heights(tmp_path: Path, code: int) -> None:
     """Depths were read as heights, with a unit "from the file"."""
@@ -197,6 +198,7 @@ def test_a_key_for_the_grid_does_not_change_what_the_file_says_of_heights(tmp_pa
     assert load(path, crs="EPSG:4326+5773", height_unit="m").info["vertical_datum"] == "EGM96"
 
 
+@pytest.mark.nightly
 def test_a_key_for_the_grid_leaves_the_file_s_datum_and_unit(tmp_path: Path) -> None:
     heights = np.round(hills(100, 100))
     ellipsoidal = degrees_tif(tmp_path / "a.tif", heights, crs="EPSG:4979")
@@ -208,6 +210,7 @@ def test_a_key_for_the_grid_leaves_the_file_s_datum_and_unit(tmp_path: Path) -> 
     assert surface.info["vertical_datum"] == "NAVD88"
 
 
+@pytest.mark.nightly
 def test_tiles_in_feet_do_not_lend_their_unit_to_one_that_states_none(tmp_path: Path) -> None:
     heights = np.round(hills(100, 100)) + 300.0
     a = degrees_tif(tmp_path / "a.tif", heights, units=("ft",))
@@ -223,6 +226,7 @@ def test_tiles_in_feet_do_not_lend_their_unit_to_one_that_states_none(tmp_path: 
     assert both.differs
 
 
+@pytest.mark.nightly
 def test_a_grid_in_feet_needs_the_unit_of_its_heights(tmp_path: Path) -> None:
     heights = np.round(hills(400, 400))
     # North Carolina's grid in US survey feet, around the frame's place.
@@ -261,6 +265,7 @@ def test_one_line_says_how_heights_were_read(tmp_path: Path) -> None:
     assert " to -4" in str(below.info["heights_read"])
 
 
+@pytest.mark.nightly
 def test_older_geotiffs_keep_their_vertical_part(tmp_path: Path) -> None:
     heights = np.round(hills(100, 100))
     for version in ("1.0", "1.1"):
@@ -294,6 +299,7 @@ def test_a_patch_of_zeros_without_a_shore_is_a_void_and_named(tmp_path: Path) ->
     assert "undeclared" not in notes_of(load(path, nodata=0.0))
 
 
+@pytest.mark.nightly
 def test_sea_and_lakes_with_a_shore_are_ground(tmp_path: Path) -> None:
     for beside in (5.0, -5.0, 0.3):
         assert not np.isnan(load(degrees_tif(tmp_path / "a.tif", holed(0.0, beside))).ground_m).any()

@@ -150,6 +150,7 @@ def test_many_names_are_shortened_and_the_nearest_area_is_named() -> None:
     assert zone.name_at(590.0, 20.0) == "a5"
 
 
+@pytest.mark.nightly
 def test_more_pieces_than_are_taken_are_refused() -> None:
     areas = [area(f"{k}", box(10 * k, 10 * (k % 7), 10 * k + 5, 10 * (k % 7) + 5)) for k in range(-205, 205)]
     with pytest.raises(InputError, match=f"more than {MOST_PIECES} pieces"):

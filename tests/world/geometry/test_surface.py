@@ -93,6 +93,7 @@ def test_rows_go_south_and_columns_go_east() -> None:
     assert dx == pytest.approx(dy * math.cos(math.radians(36.6)), rel=0.01)
 
 
+@pytest.mark.nightly
 def test_the_jacobian_is_the_slope_of_the_map() -> None:
     fitted = GridMap.fit(Exact(Frame(60.0, 20.0), 3035, 25.0), (-50_000, -50_000, 50_000, 50_000))
     for east, north in ((0.0, 0.0), (40_000.0, -30_000.0), (-50_000.0, 50_000.0)):

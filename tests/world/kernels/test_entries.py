@@ -48,6 +48,7 @@ def _as_in_kernels() -> object:
         yield
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("seed", range(3))
 def test_legs_are_judged_alike_by_machine_code_and_plain_functions(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     assert airspace.judge is judge

@@ -177,7 +177,7 @@ def test_a_geotiff_in_degrees_is_bilinear_between_its_cell_centres(tmp_path: Pat
     assert surface.grid.error_m < 0.01
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("crs", ["EPSG:32616", "EPSG:3857", "EPSG:5070", "EPSG:4269", "EPSG:32617", "EPSG:26916+5703"])
 def test_a_geotiff_in_any_system_is_bilinear_in_its_own_grid(tmp_path: Path, crs: str) -> None:
     there = Transformer.from_crs(FRAME.crs, crs.split("+")[0], always_xy=True, allow_ballpark=False)
@@ -196,6 +196,7 @@ def hgt(path: Path, posts: Floats) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_srtm_posts_lie_on_whole_degrees_and_neighbouring_tiles_join(tmp_path: Path) -> None:
     both = hills(2401, 1201)
     tiles = [hgt(tmp_path / "N36W085.hgt", both[:, :1201]), hgt(tmp_path / "N36W084.hgt", both[:, 1200:])]
@@ -211,6 +212,7 @@ def test_srtm_posts_lie_on_whole_degrees_and_neighbouring_tiles_join(tmp_path: P
     assert surface.info["dem_sha256"] == hashlib.sha256("\n".join(hashes).encode()).hexdigest()
 
 
+@pytest.mark.slow
 def test_a_zipped_hgt_as_mavproxy_keeps_it_is_the_same_ground(tmp_path: Path) -> None:
     posts = hills(1201, 1201)
     posts[7, 9] = -32768
@@ -418,6 +420,7 @@ def test_covers_tells_of_many_places_what_it_tells_of_each(tmp_path: Path, west:
 # -- units and datums ---------------------------------------------------------------------------------------------
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize(
     ("more", "keys", "metres"),
     [({"units": ("ft",)}, {}, 0.3048), ({"units": ("US survey foot",)}, {}, 1200 / 3937),
@@ -686,6 +689,7 @@ def test_a_second_band_is_told(tmp_path: Path) -> None:
     assert any("2 bands" in str(n) for n in notes_on(load(degrees_tif(tmp_path / "a.tif", two)).info))
 
 
+@pytest.mark.slow
 def test_tiles_that_do_not_fit_together_are_layers(tmp_path: Path) -> None:
     first = degrees_tif(tmp_path / "a.tif")
     finer = tif(tmp_path / "b.tif", hills(100, 100), from_origin(-84.6, 36.6, 0.001, 0.001))
@@ -839,6 +843,7 @@ def test_gridded_peaks_are_never_below_the_true_ones(
         assert above.max() <= 0.02
 
 
+@pytest.mark.slow
 @settings(max_examples=draws(24))
 @given(
     st.lists(
@@ -895,7 +900,7 @@ def test_an_obstacle_height_stands_on_all_ground(tmp_path: Path) -> None:
     assert surface.info["bare_dem"] is False
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("crs", "cell"),
     [("EPSG:4326", 0.0003), ("EPSG:4326", 0.0071), ("EPSG:4326", 0.002), ("EPSG:32616", 35.0), ("EPSG:32616", 400.0)],
@@ -919,6 +924,7 @@ def test_a_canopy_is_never_under_estimated(tmp_path: Path, crs: str, cell: float
     assert "canopy_sha256" in surface.info
 
 
+@pytest.mark.slow
 def test_a_lone_tree_stands_in_the_cells_that_it_meets_and_nowhere_else(tmp_path: Path) -> None:
     trees = np.zeros((1000, 1000), "uint8")
     trees[500, 500] = 30
@@ -930,6 +936,7 @@ def test_a_lone_tree_stands_in_the_cells_that_it_meets_and_nowhere_else(tmp_path
     assert surface.top_at(0.0, 0.0) - surface.ground_at(0.0, 0.0) == pytest.approx(30.0, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_unknown_canopy_is_unknown_unless_its_height_is_given(tmp_path: Path) -> None:
     trees = np.full((1000, 1000), 10, "uint8")
     trees[500, 500] = 255
@@ -970,6 +977,7 @@ def good_tif(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     return path.read_bytes()
 
 
+@pytest.mark.slow
 @pytest.mark.draws
 def test_a_corrupted_geotiff_is_read_or_refused(good_tif: bytes, tmp_path: Path) -> None:
     assert draw_attacks(90, partial(corrupted_geotiff, good_tif, tmp_path / "broken.tif")) == {"read", "refused"}

@@ -27,6 +27,7 @@ from gcsplan.vehicle import Autopilot
 from tests.mavlink.link.session.test_session import COPTER, CUT_CORNER, HOME, OPTIONS, PX4, air, mission, vehicle
 
 
+@pytest.mark.slow
 def test_a_fleet_on_one_port_takes_as_long_as_its_slowest_and_each_gets_its_own() -> None:
     boards = [vehicle(COPTER if n % 2 else PX4, n) for n in range(1, 13)]
     sent = [mission(board.autopilot, 10 + board.sysid, board.sysid, 700 + board.sysid) for board in boards]

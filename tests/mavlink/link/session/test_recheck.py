@@ -169,6 +169,7 @@ def test_a_fence_is_held_to_the_same() -> None:
 # -- another vehicle with the same number -------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_stranger_with_the_same_number_gets_nothing_though_it_speaks_all_the_time() -> None:
     """Over real sockets, prompt answers included: it appears at the first announcement, armed."""
     stranger = Acting(COPTER, lambda *_: None, armed=True)
@@ -349,6 +350,7 @@ def test_who_speaks_after_a_silence_is_looked_at_before_it_is_answered() -> None
     assert not [data for data in sent if data[7] in (44, 73, 45)]
 
 
+@pytest.mark.slow
 def test_a_silent_vehicle_and_a_voice_from_elsewhere_are_not_taken_for_one() -> None:
     air = Air(4, Radio(delay_s=0.05), limit_s=600.0)
     first, second = craft(air), craft(air)
@@ -460,6 +462,7 @@ def test_more_than_a_vehicle_can_hold_is_not_even_begun() -> None:
     assert board.count(Request) == 0
 
 
+@pytest.mark.slow
 def test_a_vehicle_that_asks_on_and_on_is_left_after_two_seconds_an_item_more() -> None:
     """Every request is new to it, and slow: progress, but without an end in sight."""
 

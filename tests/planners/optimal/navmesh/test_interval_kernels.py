@@ -100,6 +100,7 @@ def test_no_altitude_that_the_exact_check_passes_is_shut(turned: bool, parts: in
     assert near > 1000
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize(("slope", "open_"), [(0.05, True), (0.5, False)])
 @pytest.mark.parametrize("under", [True, False])
 def test_a_steep_slope_shuts_what_is_left_below_a_zone_and_above_it(slope: float, open_: bool, under: bool) -> None:

@@ -178,6 +178,7 @@ def world_of(rng: np.random.Generator, world: str, limits: str, parts: int) -> t
     return problem, make_plane(problem, EVERYWHERE, parts), float(rng.uniform(250.0, 330.0))
 
 
+@pytest.mark.first_quick
 @pytest.mark.draws
 @pytest.mark.parametrize("limits", LIMITS)
 @pytest.mark.parametrize("world", WORLDS)
@@ -195,7 +196,7 @@ def test_what_the_exact_check_passes_below_the_cap_is_free_in_the_mesh_for_bound
     assert passed > 30
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("limits", LIMITS)
 @pytest.mark.parametrize("world", ["hills", "amsl", "tall", "lids"])
 def test_ways_in_the_mesh_for_paths_pass_the_exact_check(world: str, limits: str) -> None:
@@ -220,6 +221,7 @@ def test_ways_in_the_mesh_for_paths_pass_the_exact_check(world: str, limits: str
     assert held > 20
 
 
+@pytest.mark.first_quick
 @pytest.mark.draws
 @pytest.mark.parametrize("limits", LIMITS)
 @pytest.mark.parametrize("world", WORLDS)
@@ -282,7 +284,7 @@ def test_the_floor_for_bounds_knows_of_what_rises_beside_and_no_more(world: str,
     assert raised > 0.2 * held, raised / held
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("stride", [2, 3])
 @pytest.mark.parametrize("world", ["amsl", "turned"])
 def test_cells_made_one_shut_out_nothing_that_passes_the_exact_check(world: str, stride: int) -> None:
@@ -303,7 +305,7 @@ def test_cells_made_one_shut_out_nothing_that_passes_the_exact_check(world: str,
     assert shut > 0 or stride == 3
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("low", [True, False])
 @pytest.mark.parametrize(
     "world", ["hills", *(pytest.param(w, marks=pytest.mark.slow) for w in ("amsl", "turned")), "agl"]
@@ -436,6 +438,7 @@ def test_no_track_runs_nearer_to_the_terrains_border_than_ground_must_be_known(
             assert free.all()
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("turn", [0.0, 0.2, -0.3])
 def test_the_rim_of_a_zone_over_a_slope_is_no_wall_where_the_zone_can_be_passed_over(turn: float) -> None:
     n = round(SIZE_M / STEP_M) + 1

@@ -48,7 +48,7 @@ def mission(zones: list[Zone], reach_m: float, via: tuple[Via, ...] = ()) -> Pro
     return Problem(Airspace(FLAT, zones), limits, (-1500.0, 0.0, 40.0), (1500.0, 0.0, 40.0), via)
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", seeds(10, 35, 60))
 def test_bound_and_path_enclose_the_visibility_graphs_track(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -142,6 +142,7 @@ def test_a_goal_inside_a_closed_ring_is_proved_infeasible() -> None:
     assert caught.value.reason == "infeasible"
 
 
+@pytest.mark.nightly
 def test_a_c_around_the_goal_leaves_no_gap() -> None:
     angle = np.linspace(0.3, 2.0 * math.pi - 0.3, 40)
     ring = shapely.LineString(np.array([1500.0, 0.0]) + 500.0 * np.stack([np.cos(angle), np.sin(angle)], axis=-1))

@@ -206,7 +206,7 @@ def turned(place: Floats) -> Place:
 
 
 @pytest.mark.nightly_but("0-5-plain", "0-0-turned", "12-0-sheared", "12-5-plain", "12-5-turned")
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("form", EACH_FORM)
 @pytest.mark.parametrize("holes", [pytest.param(0, marks=pytest.mark.slow), 5])
 @pytest.mark.parametrize("zones", [0, 12])
@@ -310,6 +310,7 @@ def test_a_saddle_is_crossed_where_its_diagonal_says_so(corners: tuple[float, ..
         assert math.isfinite(Free(excess, cut, PLAIN).distances(np.array([a, b]), 1)[0, 1]) == passed
 
 
+@pytest.mark.nightly
 def test_starts_on_nodes_edges_and_the_rim_find_the_same_way() -> None:
     rng = np.random.default_rng(11)
     compared = 0
@@ -333,6 +334,7 @@ def test_starts_on_nodes_edges_and_the_rim_find_the_same_way() -> None:
     assert compared > 60
 
 
+@pytest.mark.nightly
 def test_a_limit_shuts_out_all_that_is_longer_and_nothing_else() -> None:
     rng = np.random.default_rng(5)
     compared = 0

@@ -198,6 +198,7 @@ def world(zones: list[Zone], heights: Floats, limits: Limits, start: Place, goal
     return Leg(problem, End(*start), End(*goal), top_m)
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("seed", range(5))
 def test_every_altitude_that_is_legal_in_a_cell_lies_in_one_of_its_intervals(seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -189,7 +189,7 @@ def test_with_laps_the_bound_rises_and_stays_below_the_best_path() -> None:
     assert 1700.0 < below.bound <= best
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize(("half_m", "around"), [(150.0, True), (850.0, False)])
 def test_a_zone_entered_below_that_must_be_left_above_is_passed_by_the_shorter_way(half_m: float, around: bool) -> None:
     """A path fits below the zone's western half, but its eastern half stands on a hill, which must be overflown."""

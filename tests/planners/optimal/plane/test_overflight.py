@@ -92,6 +92,7 @@ def test_the_path_over_a_zone_is_the_best_of_all_sampled_ones() -> None:
     assert found.path.length_m == pytest.approx(float(lengths.min()), rel=2e-4)
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("seed", range(4))
 def test_the_bound_of_energy_counts_the_climb_over_the_highest_zone(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -104,6 +105,7 @@ def test_the_bound_of_energy_counts_the_climb_over_the_highest_zone(seed: int) -
     assert math.isfinite(cost)
 
 
+@pytest.mark.slow
 def test_the_bound_over_a_long_wall_has_its_climb_and_its_descent() -> None:
     """Around the wall it is kilometres: over it a path rises by 119 m within 617 m, and sinks again."""
     work = Workspace(Incumbent(CASES["over a long wall"]))

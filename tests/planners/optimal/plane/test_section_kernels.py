@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from gcsplan.planners.optimal.plane.section_kernels import NONE, cheapest_chains, lay_sections
+from tests.support.effort import seeds
 
 SEEDS = range(6)
 
@@ -110,7 +111,7 @@ def chains(seed: int, *, beyond: float) -> tuple[float, float, bool]:
     return bound, float(of[n - 1].min()), bool((value[:, 0] >= NONE).any())
 
 
-@pytest.mark.parametrize("seed", range(30))
+@pytest.mark.parametrize("seed", seeds(6, 6, 30))
 def test_chains_cost_no_less_than_their_bound_and_little_more(seed: int) -> None:
     bound, least, _ = chains(seed, beyond=0.0)
     if bound < NONE:
@@ -121,6 +122,7 @@ def test_chains_cost_no_less_than_their_bound_and_little_more(seed: int) -> None
     assert chains(seed, beyond=1.0)[0] <= bound
 
 
+@pytest.mark.slow
 def test_nodes_are_shut_that_no_cheap_chain_passes() -> None:
     found = [chains(seed, beyond=0.0) for seed in range(30)]
     assert any(shut for _, _, shut in found)

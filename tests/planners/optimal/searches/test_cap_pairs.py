@@ -87,6 +87,7 @@ class Caps:
         return min(map(self.cost, [*np.linspace(self.low, self.top, 3000), *self.at, self.low]))
 
 
+@pytest.mark.slow
 @given(st.integers(0, 2**31), st.sampled_from([0.0, 1e-3, 1e-2]), st.sampled_from([0.0, 0.02, 0.3]))
 @settings(max_examples=draws(60))
 def test_no_cap_costs_less_than_the_bound(seed: int, gap: float, blind: float) -> None:
@@ -189,6 +190,7 @@ def flown(problem: Problem, track: Floats) -> Path | None:
     return Path(points)
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("seed", range(3))
 def test_floors_are_never_above_the_ground_that_a_short_track_sees(seed: int) -> None:
     problem = hills(seed, BARE)
@@ -300,7 +302,7 @@ def test_no_path_past_vias_costs_less_than_the_bound(objective: Objective, climb
     assert near >= 1
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize(("seed", "least_percent"), [(1, 0.04), (13, 0.1), (29, 0.2)])
 def test_fine_tracks_with_a_track_error_pass_as_near_to_terrain_as_allowed(
     seed: int, least_percent: float, monkeypatch: pytest.MonkeyPatch

@@ -56,7 +56,7 @@ def test_a_slope_under_a_low_zone_is_climbed_aslant(objective: str) -> None:
     assert solution.lower_bound <= p.cost(solution.path)
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("objective", ["length", "energy"])
 def test_the_track_over_the_lattice_has_way_enough_to_climb(objective: str) -> None:
     found = traverse(replace(under_a_lid(), objective="energy" if objective == "energy" else "length"), 2200.0)

@@ -123,6 +123,7 @@ def test_worlds_with_very_many_zones_are_searched_as_well() -> None:
     assert cost_of(p, found[0]) <= 1.01 * shortest_past_discs(p.start[:2], p.goal[:2], np.array(discs))
 
 
+@pytest.mark.slow
 def test_a_roadmap_asks_for_budget_between_blocks_of_legs(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(local_roadmap, "LEGS_AT_ONCE", 500)
     asked: list[float] = []

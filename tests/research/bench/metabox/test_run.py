@@ -17,6 +17,7 @@ from tests.research.bench.metabox.made import FEW
 from tests.support.metabox import interpreter
 
 
+@pytest.mark.slow
 def test_every_run_has_its_record_and_nobody_more_than_the_budget(result: dict[str, Any]) -> None:
     keys = [(r["instance"], r["algorithm"], r["run"]) for r in result["runs"]]
     assert keys == [(i, a, k) for i in range(2) for a in FEW["algorithms"] for k in range(2)]  # type: ignore[attr-defined]
@@ -41,6 +42,7 @@ def test_a_run_is_the_same_again_and_in_two_processes(result: dict[str, Any], py
     assert told[-1] == (6, 6)
 
 
+@pytest.mark.slow
 def test_a_cost_that_is_not_the_known_one_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="the cost of MetaEvoBox is not the known one"):
         metabox.run(tmp_path / "out", interpreter(tmp_path, extra=0.01), **FEW)  # type: ignore[arg-type]

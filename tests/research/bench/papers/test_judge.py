@@ -76,6 +76,7 @@ def _case(scenario: str = SCENARIO, words: str = "ssgwo < gwo", **runs: list[dic
     return next(c for c in cases if c["words"] == words and c["measure"] == "length, m")
 
 
+@pytest.mark.slow
 def test_a_claim_holds_ties_or_is_reversed_only_where_the_runs_say_so() -> None:
     low, level, high = _runs("ssgwo", 1150.0), _runs("igwo", 1150.0), _runs("gwo", 1160.0)
     assert _case(ssgwo=low, gwo=high)["verdict"] == HOLDS

@@ -20,6 +20,7 @@ from gcsplan.research.bench.papers.statistics import row
 from tests.research.bench.papers.made import PAIR, SCENARIO, record
 
 
+@pytest.mark.slow
 def test_the_report_has_ours_beside_the_printed_and_marks_the_impossible(
     finished: tuple[dict[str, Any], Path],
 ) -> None:
@@ -94,6 +95,7 @@ def test_what_is_said_of_the_tables_is_worked_out_from_them() -> None:
     assert "identical" not in msfoa[0] + msfoa[2]
 
 
+@pytest.mark.slow
 def test_printed_times_that_stand_in_the_wrong_column_are_marked() -> None:
     name = "ib-abc-sequence"
     rows = [row(name, a, [record(a, 0, 1000.0, lengths_m=[250.0] * 4)], 0) for a in ("ib-abc", "b-abc", "abc")]

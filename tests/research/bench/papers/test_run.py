@@ -42,6 +42,7 @@ def test_a_run_is_what_its_search_gives(finished: tuple[dict[str, Any], Path]) -
     assert len(result["claims"]) == 4  # those on length, collisions, pitch and yaw of these two
 
 
+@pytest.mark.slow
 def test_what_is_finished_is_not_run_again(
     finished: tuple[dict[str, Any], Path], missions: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -33,6 +33,7 @@ def test_every_file_that_makes_kept_runs_old_is_there(pattern: str) -> None:
     assert list(ROOT.glob(pattern))
 
 
+@pytest.mark.slow
 def test_a_change_of_anything_that_a_run_calls_makes_kept_runs_old(
     finished: tuple[dict[str, Any], Path], missions: Path
 ) -> None:

@@ -38,6 +38,7 @@ def test_the_speed_report_says_what_was_missed() -> None:
     )
 
 
+@pytest.mark.slow
 def test_the_parts_of_the_costs_time_add_up() -> None:
     took = {name: float(i) for i, name in enumerate(papers_speed.parts_of_cost(), start=1)}
     parts = papers_speed.differences(took)
