@@ -14,7 +14,6 @@ from gcsplan.app.check.worlds import (
     Checked,
     CheckSite,
     MissionSite,
-    OptionsSite,
     Returns,
     VerdictParts,
     at_start,
@@ -30,9 +29,7 @@ from gcsplan.mavlink.mission.mission import Home, Mission
 from gcsplan.mission_file import MissionFile
 from gcsplan.mission_file.changes import MissionChange, changed
 from gcsplan.mission_file.load import load_content
-from gcsplan.mission_file.options_world import WorldOptions
 from gcsplan.notes.note import IN_FILES, Note, Wording
-from gcsplan.vehicle import Autopilot
 
 
 @dataclass(frozen=True)
@@ -104,16 +101,6 @@ def check_mission(source: MissionFile, mission: Mission, vehicle: str | None = N
     site = MissionSite(source)
     site.settle(np.array(places_of(read.mission)), 0.0, several=False)
     return site.judged(argument, read, VerdictParts())
-
-
-def check_with_options(
-    options: WorldOptions, autopilot: Autopilot | None, arguments: Sequence[str], *, returns: Returns = NO_RETURNS
-) -> Batch:
-    """Judge each FILE in the world that ``options`` describe, see `OptionsSite`; ``returns``: as in `check_batch`.
-
-    Raises InputError if the options are wrong.
-    """
-    return check_at(OptionsSite(options, autopilot), "check", arguments, VerdictParts(returns))
 
 
 def check_at(site: CheckSite, name: str, arguments: Sequence[str], parts: VerdictParts) -> Batch:

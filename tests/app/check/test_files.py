@@ -12,7 +12,8 @@ from typing import Any
 
 import pytest
 
-from gcsplan.app.check.files import Batch, check_with_options, finding_lines
+from gcsplan.app.check.files import Batch, check_at, finding_lines
+from gcsplan.app.check.worlds import OptionsSite, VerdictParts
 from gcsplan.cli import main as cli
 from gcsplan.errors import InputError
 from gcsplan.mission_file.options_world import WorldOptions
@@ -41,6 +42,10 @@ def judged(batch: Batch) -> dict[str, Any]:
     return {str(c.file): c for c in batch.checked}
 
 
+def with_options(options: WorldOptions, autopilot: Autopilot | None, arguments: list[str]) -> Batch:
+    return check_at(OptionsSite(options, autopilot), "check", arguments, VerdictParts())
+
+
 def compare_with(case: Case, checked: Any) -> str:
     """What is amiss with a verdict; empty if it is as planted."""
     verdict = checked.verdict
@@ -64,7 +69,7 @@ def amiss(written: dict[str, Case], batch: Batch) -> list[str]:
 def test_files_with_a_home_are_judged_as_planted(folder: Path, options: WorldOptions) -> None:
     written = corpus.write(folder, corpus.WITH_HOME)
     assert len(written) > 100
-    assert amiss(written, check_with_options(options, Autopilot.ARDUCOPTER, list(written))) == []
+    assert amiss(written, with_options(options, Autopilot.ARDUCOPTER, list(written))) == []
 
 
 @pytest.mark.slow
@@ -73,8 +78,8 @@ def test_files_without_a_home_are_judged_with_the_one_that_is_given(folder: Path
     given = WorldOptions(
         options.terrain, options.zones, options.limits, home=corpus.degrees(*corpus.HOME), rtl_rel_home_m=corpus.RTL_M
     )
-    assert amiss(written, check_with_options(given, Autopilot.ARDUCOPTER, list(written))) == []
-    batch = check_with_options(options, Autopilot.ARDUCOPTER, list(written))
+    assert amiss(written, with_options(given, Autopilot.ARDUCOPTER, list(written))) == []
+    batch = with_options(options, Autopilot.ARDUCOPTER, list(written))
     assert batch.checked == ()
     assert all("home" in error.message for _, error in batch.unreadable)
 
@@ -82,7 +87,7 @@ def test_files_without_a_home_are_judged_with_the_one_that_is_given(folder: Path
 @pytest.mark.slow
 def test_plans_for_px4_are_judged_as_planted(folder: Path, options: WorldOptions) -> None:
     written = corpus.write(folder, corpus.PX4)
-    assert amiss(written, check_with_options(options, None, list(written))) == []
+    assert amiss(written, with_options(options, None, list(written))) == []
 
 
 @pytest.mark.slow
@@ -90,7 +95,7 @@ def test_the_place_of_a_violation_is_where_it_was_planted(folder: Path, options:
     written = corpus.write(folder, {"qgc": corpus.WITH_HOME["qgc"]})
     files = {case.name: file for file, case in written.items()}
     names = ["hill_between", "through_zone", "jump_through_zone", "circle_into_zone"]
-    found = judged(check_with_options(options, Autopilot.ARDUCOPTER, [files[n] for n in names]))
+    found = judged(with_options(options, Autopilot.ARDUCOPTER, [files[n] for n in names]))
 
     def place(name: str) -> tuple[float, float]:
         (finding, *_) = found[files[name]].verdict.findings
@@ -107,7 +112,7 @@ def test_the_place_of_a_violation_is_where_it_was_planted(folder: Path, options:
 def test_the_nearest_misses_are_told_for_every_limit(folder: Path, options: WorldOptions) -> None:
     written = corpus.write(folder, {"qgc": corpus.WITH_HOME["qgc"]})
     file = next(f for f, case in written.items() if case.name == "round")
-    (checked,) = check_with_options(options, Autopilot.ARDUCOPTER, [file]).checked
+    (checked,) = with_options(options, Autopilot.ARDUCOPTER, [file]).checked
     misses = {miss.kind: miss for miss in checked.verdict.misses if miss.zone != "wood"}
     assert set(misses) >= {"min_agl", "max_amsl", "terrain_clearance", "zone", "climb"}
     assert misses["min_agl"].room == pytest.approx(100 - 60 - 5, abs=0.1)
@@ -125,7 +130,7 @@ def test_what_is_not_judged_is_named(folder: Path, options: WorldOptions) -> Non
     strange = (*corpus.cases()[0].items[:3], corpus.to(0, -2500, 120.0, 31000), *corpus.cases()[0].items[3:])
     file = folder / "strange.waypoints"
     file.write_text(corpus.qgroundcontrol(strange))
-    (checked,) = check_with_options(options, Autopilot.ARDUCOPTER, [str(file)]).checked
+    (checked,) = with_options(options, Autopilot.ARDUCOPTER, [str(file)]).checked
     assert checked.verdict.safe is None
     (line,) = finding_lines(checked)
     assert line.startswith(f"{file}:4: not_judged: ")
@@ -147,7 +152,7 @@ def test_what_is_not_judged_is_named(folder: Path, options: WorldOptions) -> Non
 def test_an_option_that_is_off_is_named(options: WorldOptions, change: dict[str, Any], said: str) -> None:
     off = WorldOptions(**({"terrain": options.terrain, "zones": options.zones, "limits": options.limits} | change))
     with pytest.raises(InputError) as refused:
-        check_with_options(off, None, [])
+        with_options(off, None, [])
     assert said in str(refused.value)
 
 
@@ -164,10 +169,10 @@ def test_a_zone_that_is_under_ground_here_and_reaches_far_beyond_is_no_mistake(
 
     (name,) = (f for f, c in corpus.write(folder, {"qgc": corpus.WITH_HOME["qgc"]}).items() if c.name == "round")
     far = WorldOptions(options.terrain, (zone(2.0),), options.limits)
-    (checked,) = check_with_options(far, Autopilot.ARDUCOPTER, [name]).checked
+    (checked,) = with_options(far, Autopilot.ARDUCOPTER, [name]).checked
     assert checked.verdict.safe is True
     with pytest.raises(InputError, match="under ground"):
-        check_with_options(WorldOptions(options.terrain, (zone(0.01),), options.limits), Autopilot.ARDUCOPTER, [name])
+        with_options(WorldOptions(options.terrain, (zone(0.01),), options.limits), Autopilot.ARDUCOPTER, [name])
 
 
 # -- the command --------------------------------------------------------------------------------------------------
@@ -258,6 +263,7 @@ def test_findings_stand_before_the_table(run: Any, folder: Path, world: list[str
     assert out.count("UNSAFE") == 1
 
 
+@pytest.mark.slow
 def test_json_holds_every_leg_and_miss_with_places_to_a_centimetre(run: Any, folder: Path, world: list[str]) -> None:
     code, out, _ = run(file_of(folder, "through_zone"), *world, "--json")
     document = json.loads(out)

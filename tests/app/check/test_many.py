@@ -17,9 +17,9 @@ import pytest
 
 from gcsplan.app.check import many as module
 from gcsplan.app.check import worlds as check_sites
-from gcsplan.app.check.files import check_batch, check_with_options, finding_lines
+from gcsplan.app.check.files import check_at, check_batch, finding_lines
 from gcsplan.app.check.many import Archive, FileResult, Form, Shown, Summary
-from gcsplan.app.check.worlds import NO_RETURNS, Returns
+from gcsplan.app.check.worlds import NO_RETURNS, OptionsSite, Returns, VerdictParts
 from gcsplan.app.parallel.executor import Executor, Inline, executor
 from gcsplan.cli import main as cli
 from gcsplan.errors import InputError, UsageError
@@ -76,7 +76,7 @@ def results(
 
 @pytest.mark.slow
 def test_an_archive_is_judged_as_its_files_are_together(options: WorldOptions, files: list[str]) -> None:
-    batch = check_with_options(options, None, files)
+    batch = check_at(OptionsSite(options, None), "check", files, VerdictParts())
     told, archive = results(options, files, Inline())
     assert [t.file for t in told] == files
     by_file = {t.file: t for t in told}
