@@ -18,7 +18,6 @@ from gcsplan.notes.note import Note
 from gcsplan.world.geodesy.datum import WORST_SHIFT_M, require_no_grid, ways
 from gcsplan.world.geodesy.degree_shapes import EDGE_BOW_M, HALF_TURN_DEG, unwrapped
 
-WGS84 = "WGS 84"
 METRES_OF_DEGREE = 111_700.0
 """The most metres of a degree of latitude."""
 

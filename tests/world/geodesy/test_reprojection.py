@@ -7,7 +7,7 @@ import pytest
 from pyproj import Transformer
 
 from gcsplan.errors import InputError
-from gcsplan.world.geodesy.reprojection import WGS84, ToDegrees
+from gcsplan.world.geodesy.reprojection import ToDegrees
 
 UTM = "EPSG:32617"
 MIDDLE = (300_000.0, 4_000_000.0)
@@ -21,7 +21,7 @@ def test_degrees_on_wgs_84_stay_as_they_are_without_a_note() -> None:
     same = converted("EPSG:4326", (10.0, 50.0))
     xy = np.array([[10.0, 50.0], [11.0, 51.0]])
     assert same.note is None
-    assert same.name == WGS84
+    assert same.name == "WGS 84"
     assert same.points(xy).tolist() == [[50.0, 10.0], [51.0, 11.0]]
     assert same.line(xy, 100).tolist() == [[50.0, 10.0], [51.0, 11.0]]
 
