@@ -9,6 +9,7 @@ import runpy
 import subprocess
 import sys
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any, get_args
@@ -72,6 +73,7 @@ def test_the_mission_file_s_reference_names_every_key_once_and_says_what_it_is(m
     assert len(keys) == wanted
 
 
+@pytest.mark.nightly
 def test_units_and_defaults_are_those_of_the_code(made: ModuleType) -> None:
     told = {(cells[0], cells[3]): cells[1:3] for cells in rows(made.mission_file())}
     by_key = {key: value for (key, _), value in told.items()}
@@ -162,6 +164,7 @@ def test_the_contract_names_every_key_of_the_summary_and_every_kind_of_violation
         assert f"`{kind}`" in text, kind
 
 
+@pytest.mark.nightly
 def test_the_contract_names_every_command() -> None:
     import typer.main
 
@@ -194,6 +197,11 @@ def test_links_between_documents_lead_somewhere(page: Path) -> None:
 ROOMS = ("gcsplan", "tests", "sitl_tests", "missions", "docs")
 
 
+@cache
+def words_of(source: Path) -> frozenset[str]:
+    return frozenset(re.findall(r"\w+", source.read_text(encoding="utf-8")))
+
+
 @pytest.fixture(scope="module")
 def paths() -> list[str]:
     """Every file and folder that a page may name, from the top."""
@@ -221,8 +229,7 @@ def test_modules_and_folders_that_a_page_names_are_there(page: Path, paths: list
 def test_names_that_developers_are_sent_to_are_there(name: str, paths: list[str]) -> None:
     named = named_in(DOCS / name)
     assert lacking({one for one in named if re.fullmatch(r"[\w*-]+\.py", one)}, paths) == []
-    sources = [TOP / path[1:] for path in paths if path.endswith(".py")]
-    words = {word for source in sources for word in re.findall(r"\w+", source.read_text(encoding="utf-8"))}
+    words = {word for path in paths if path.endswith(".py") for word in words_of(TOP / path[1:])}
     names = {match[1] for one in named if (match := re.fullmatch(r"(?:\w+\.)*?(\w+)(?:\.py|\.md|\(.*\))?", one))}
     assert sorted(names - words - {Path(path).stem for path in paths}) == []
 
@@ -231,8 +238,7 @@ def test_names_that_developers_are_sent_to_are_there(name: str, paths: list[str]
 def test_names_in_brackets_behind_a_module_stand_in_it(page: Path, paths: list[str]) -> None:
     text = page.read_text(encoding="utf-8")
     for module, within in re.findall(r"`([\w/]+\.py)` \(([^()]*`\w+`[^()]*)\)", text):
-        files = [TOP / path[1:] for path in paths if path.endswith(f"/{module}")]
-        words = {word for file in files for word in re.findall(r"\w+", file.read_text(encoding="utf-8"))}
+        words = {word for path in paths if path.endswith(f"/{module}") for word in words_of(TOP / path[1:])}
         assert set(re.findall(r"`(\w+)`", within)) <= words, module
 
 

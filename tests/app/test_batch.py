@@ -31,6 +31,7 @@ def ran(folder: Path, out: Path, **options: Any) -> tuple[dict[str, Record], int
     return {r.mission: r for r in done}, len(todo)
 
 
+@pytest.mark.slow
 def test_every_mission_has_its_record_and_its_outputs(folder: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     records, planned = ran(folder, out)
@@ -115,6 +116,7 @@ def test_the_exit_code_is_the_worst(codes: list[int], worst: int) -> None:
     assert exit_code([Record("m", "", code, ()) for code in codes]) == worst
 
 
+@pytest.mark.slow
 def test_rows_as_csv_and_parquet() -> None:
     rows = [{"a": 1.5, "b": "x,y"}, {"b": None}]
     assert csv_text(("a", "b"), rows) == 'a,b\n1.5,"x,y"\n,\n'

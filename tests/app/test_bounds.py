@@ -205,6 +205,7 @@ def test_a_short_level_leg_is_shorter_by_the_rounding_in_the_plane_alone() -> No
     assert v.solution.lower_bound == pytest.approx(30.0 - 0.022, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_only_vias_take_track_error_from_bounds_since_ends_keep_the_rounding() -> None:
     v = planned(ERRORS, DISC)
     assert v.problem.checked is not None

@@ -153,6 +153,7 @@ def test_a_vehicle_that_leans_less_than_the_plan_needs_is_refused_and_gets_nothi
     assert not uploaded(planned(), {"ANGLE_MAX": 2500.0}).verified
 
 
+@pytest.mark.slow
 def test_simulated_vehicles_lean_as_far_as_their_missions_need() -> None:
     [result] = upload(planned(lean_angle_deg=45), "sim")
     assert result.verified

@@ -109,6 +109,7 @@ def test_what_was_not_answered_is_no_default(
     assert ("inside no-fly zone" if name == "WPNAV_RADIUS" else f"{name} is {parameters[name]:g} on") in lost.message
 
 
+@pytest.mark.slow
 def test_a_value_that_comes_late_is_as_good(tmp_path: Any) -> None:
     done = planned()
     assert sent(done, board(misbehave=Misbehaviour(mute="WPNAV_ACCEL", mute_times=2)), timeout_s=20.0).verified
@@ -190,11 +191,13 @@ def test_a_number_that_no_vehicle_flies_is_not_passed_over(parameters: Mapping[s
     assert (refused.outcome, refused.reason) == ("refused", "parameters")
 
 
+@pytest.mark.slow
 def test_a_px4_that_does_not_land_after_its_return_is_told() -> None:
     result = sent(planned(keys(autopilot="px4", **RTL)), board("px4", RTL_RETURN_ALT=60, RTL_LAND_DELAY=-1))
     assert any("RTL_LAND_DELAY is -1 on board: a return ends in a hover" in str(line) for line in result.warnings)
 
 
+@pytest.mark.slow
 def test_a_speed_that_an_interrupted_mission_goes_on_at_is_told() -> None:
     result = sent(planned(keys(speed_m_s=[5, 5])), board())
     assert result.verified
@@ -234,6 +237,7 @@ def test_a_required_return_is_the_one_that_was_judged(parameters: dict[str, floa
     assert next(iter(parameters)) in refused.message
 
 
+@pytest.mark.slow
 def test_a_required_return_that_runs_on_farther_is_judged_so_where_that_is_allowed() -> None:
     required = planned(keys(rtl_rel_home_m=60), way_home="required")
     assert sent(required, board(RTL_ALT=6000, WPNAV_ACCEL=150), allow_parameters=True).verified
@@ -308,6 +312,7 @@ def test_the_list_stands_in_every_output() -> None:
     assert row.split("\t") == ["1", "1", "RTL_TYPE", "0", "6"]  # QGroundControl's five columns
 
 
+@pytest.mark.slow
 def test_a_vehicle_set_as_listed_is_taken_without_a_word() -> None:
     done = planned(keys(rtl_rel_home_m=60, speed_m_s=[14, 14], lean_angle_deg=50, climb_m_s=4, end="rtl"))
     lines = [line.split(",") for line in outputs_of(done)["uav1.param"].splitlines() if not line.startswith("#")]

@@ -157,6 +157,7 @@ def test_each_path_is_better_than_the_one_before_and_each_bound_holds() -> None:
     assert np.hypot(paths[0].lat_deg[0] - start[0], paths[0].lon_deg[0] - start[1]) < 1e-4
 
 
+@pytest.mark.slow
 def test_what_a_callback_raises_ends_the_plan_and_not_the_session() -> None:
     session = Planner(LEGS)
 

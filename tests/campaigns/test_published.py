@@ -24,6 +24,7 @@ def found(folder: Path, form: str, count: int = 60) -> str:
     return "\n".join(fault for seed in range(count) for fault in published.attack(form, seed, folder)[1])
 
 
+@pytest.mark.nightly
 def test_the_campaign_finds_shapes_that_are_left_out_without_a_name(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -149,6 +149,7 @@ def test_rounds_that_are_left_out_count_in_full() -> None:
     assert found.most_m > 2500 * 900.0
 
 
+@pytest.mark.slow
 @settings(max_examples=draws(40))
 @given(
     places=st.lists(

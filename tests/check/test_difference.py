@@ -28,6 +28,7 @@ def brute_farthest_m(line: Floats, others: Floats) -> float:
     return float(nearest.max())
 
 
+@pytest.mark.slow
 @pytest.mark.draws
 def test_a_leg_moved_as_far_as_brute_force_over_both_lines_finds() -> None:
     rng = np.random.default_rng(7)

@@ -51,6 +51,7 @@ def integral_j(times: Floats, points: Floats, wind: tuple[float, float] = (0.0, 
     return joules
 
 
+@pytest.mark.slow
 def test_the_energy_of_a_plan_is_the_integral_over_its_time_table() -> None:
     done = planned(ENERGY)
     [v], motion = done.vehicles, done.fleet.motions[0]

@@ -115,6 +115,7 @@ def test_heights_over_and_under_a_zone_are_the_least_of_every_metre(zone: dict[s
     assert frame is not None
 
 
+@pytest.mark.slow
 def test_a_zone_that_is_passed_beside_is_not_passed_over() -> None:
     [v] = crossing([{"name": "there", "center": [36.598, -84.3675], "radius_m": 200}], 120.0).vehicles
     assert v.verdict.nearest.nearest_zone == "there"

@@ -195,6 +195,7 @@ def test_a_mission_file_among_files_to_check_is_told_what_makes_them(run: Any, t
     assert f"gcsplan plan '{file}' makes such a file" in err
 
 
+@pytest.mark.slow
 def test_advised_commands_are_quoted(run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     place = ("--start", "47.0,8.0", "--goal", "47.0,8.02", "--flat", "100")

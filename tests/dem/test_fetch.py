@@ -90,7 +90,7 @@ def test_tiles_come_with_their_records_and_once_only(served: Served, tmp_path: P
     assert parts(tmp_path) == []
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(6))
 def test_four_tiles_over_a_lossy_server_end_right_or_with_a_clear_error(
     served: Served, tmp_path: Path, seed: int

@@ -123,7 +123,7 @@ def test_four_tiles_join_without_a_gap(cache: Path) -> None:
             assert 200.0 < node < 400.0
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("south", [49, 59, 69, 79, 84, -51])
 def test_tiles_with_columns_of_different_widths_join(cache: Path, south: int) -> None:
     """Each side is bilinear in its own tile; between the last row of one and the first of the other nothing is lost."""
@@ -298,6 +298,7 @@ def test_a_check_without_a_mission_takes_a_source_too(cache: Path) -> None:
     assert inputs["dem_source"] == "copernicus-glo30"
 
 
+@pytest.mark.slow
 def test_the_tiles_of_a_mission_are_those_of_its_first_window(cache: Path) -> None:
     hold(cache, Cell(36, -85))
     read = load_mission(mission())

@@ -462,6 +462,7 @@ def test_plain_words_and_nothing_else_go_into_json() -> None:
         write_summary({"a": object()})
 
 
+@pytest.mark.slow
 @settings(max_examples=draws(100))
 @given(st.dictionaries(st.sampled_from(["a_m", "min_b_m", "lat", "c"]), st.floats() | st.integers() | st.text()))
 def test_any_numbers_make_valid_json(values: dict[str, Any]) -> None:

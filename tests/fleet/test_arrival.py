@@ -489,6 +489,7 @@ def test_a_mistake_in_the_arrival_is_told(change: dict[str, Any], key: str, word
     assert words in message
 
 
+@pytest.mark.slow
 def test_accelerations_have_defaults_on_the_earth_and_none_in_local_metres() -> None:
     names = ("climb_m_s", "descent_m_s", "land_m_s", "accel_m_s2", "corner_accel_m_s2", "vertical_accel_m_s2")
     mission = load(base())

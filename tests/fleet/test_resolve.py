@@ -186,6 +186,7 @@ def test_where_nobody_may_wait_one_flies_slower() -> None:
     assert change.slot.depart_s == change.slot.hold_s == 0.0
 
 
+@pytest.mark.slow
 def test_where_the_clock_leaves_no_room_all_arrive_later_by_the_same() -> None:
     crews = crossing()
     plan = schedule(crews, "together")  # both at their fastest: nobody could make up for leaving later

@@ -108,6 +108,7 @@ def test_the_moment_and_the_places_told_are_those_of_the_least_distance() -> Non
             assert math.isclose(float(np.linalg.norm(places[0] - places[1])), e.distance_m, abs_tol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.draws
 def test_spans_of_conflict_are_those_of_samples() -> None:
     spans = 0

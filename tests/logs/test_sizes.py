@@ -61,6 +61,7 @@ def test_records_of_an_ardupilot_log_are_counted_before_they_are_read(
     assert "records; cut it to the flight, or give its parts as several logs" in refused(file)
 
 
+@pytest.mark.nightly
 def test_readings_are_counted_as_they_come(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file = flights.tlog(tmp_path / "log.tlog")
     monkeypatch.setattr(flight_log, "MOST_READINGS", 500)

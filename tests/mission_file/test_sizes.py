@@ -68,6 +68,7 @@ def test_a_ring_that_crosses_itself_a_hundred_times_is_untangled() -> None:
     assert "too tangled" not in said("crossing", 30)
 
 
+@pytest.mark.nightly
 def test_ten_thousand_arcs_are_counted_before_they_are_drawn(within_s: list[float]) -> None:
     within_s.append(5.0)  # 49 s and 1.1 GB before
     assert "its outline has 10000 points and arcs, drawn with" in said("arcs", 10_000)
@@ -138,6 +139,7 @@ def test_what_is_no_zone_is_counted_too(name: str, text: str, words: str, within
     assert words in str(refusal.value)
 
 
+@pytest.mark.nightly
 def test_zones_that_all_lie_over_each_other_take_little_memory() -> None:
     box = np.array([[-6e4, -6e4, 6e4, 6e4]]) + np.random.default_rng(1).uniform(-1e4, 1e4, (20_000, 1))
     lattice, bucket, near = lattice_over(box)

@@ -456,6 +456,7 @@ def spoilt_geojson(path: Path, data: st.DataObject) -> str:
     return judged(path, text.encode())
 
 
+@pytest.mark.slow
 @pytest.mark.draws
 def test_any_kml_gives_zones_or_clear_problems(tmp_path: Path) -> None:
     assert draw_attacks(200, partial(spoilt_kml, tmp_path / "z.kml")) == {"zones", "problems"}
@@ -489,6 +490,7 @@ def judged(path: Path, content: bytes) -> str:
     return "zones" if drafts else "problems"
 
 
+@pytest.mark.slow
 def test_every_ending_of_a_zone_file_is_read_and_named_wherever_it_is_given(tmp_path: Path) -> None:
     """One table decides; what the reference says and what a file in the wrong place is told follow it."""
     told = json.dumps(mission_schema()["$defs"]["ZoneKeys"]["properties"]["file"])

@@ -96,6 +96,7 @@ def test_a_draft_gets_start_and_goal_from_a_dropped_mission(tmp_path: Path) -> N
         assert (state["stage"], state["vehicles"][0]["start"]) == ("mission", [46.5, 8.5])
 
 
+@pytest.mark.slow
 def test_zones_are_added_as_they_were_understood_and_shown(desk: Desk, file: Path) -> None:
     data = json.dumps(ZONES).encode()
     assert "half-width" in drop(desk, "z.geojson", data)["error"]
@@ -127,6 +128,7 @@ def test_settings_name_no_file_and_wrong_ones_are_said(desk: Desk, settings: dic
     assert "passwd" not in json.dumps(found)
 
 
+@pytest.mark.slow
 def test_a_raster_becomes_the_ground_with_the_datum_that_it_needs(desk: Desk, file: Path) -> None:
     with rasterio.MemoryFile() as memory:
         with memory.open(driver="GTiff", width=40, height=40, count=1, dtype="float32", crs="EPSG:4326",
@@ -160,6 +162,7 @@ def test_a_text_with_a_mistake_is_refused_at_its_line_and_the_mission_stays(desk
     assert (after["vehicles"], after["saved"], after["undo"]) == (before["vehicles"], True, False)
 
 
+@pytest.mark.slow
 def test_a_text_is_one_step_with_its_comments_and_lasts_without_a_save(desk: Desk, file: Path) -> None:
     text = FLAT.replace("# of all", "# by hand").replace("30}", "35}")
     assert desk.ask("set_text", "state", text=text)["saved"] is False

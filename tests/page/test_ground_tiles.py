@@ -90,6 +90,7 @@ def test_terrain_that_cannot_be_opened_is_bad_input(section: object, tmp_path: P
         GroundTiles(section, tmp_path, None)
 
 
+@pytest.mark.slow
 def test_a_tile_at_a_slanted_edge_is_there_because_the_page_requests_it() -> None:
     assert (heights(GroundTiles(SAMPLE_TERRAIN, Path(), None).png(11, 544, 801)) > 200.0).all()
 

@@ -22,6 +22,7 @@ from tests.page.desk import ANSWER_S, FLAT, Desk, desk_of
 GOAL = "vehicles[0].goal"
 
 
+@pytest.mark.slow
 def test_a_page_gets_the_state_then_the_certificate_then_the_way_home(desk: Desk) -> None:
     state = desk.ask("hello", "state")
     assert (state["stage"], state["file"], state["saved"], state["undo"]) == ("mission", "field.yaml", True, False)
@@ -51,6 +52,7 @@ def test_the_certificate_is_that_of_the_command_line(desk: Desk, file: Path) -> 
     assert found["line"][:2] == [46.5, 8.5]
 
 
+@pytest.mark.slow
 def test_a_drag_gets_one_path_for_the_newest_place_and_no_step(desk: Desk) -> None:
     desk.ask("hello", "plan")
     for k in range(30):
@@ -141,6 +143,7 @@ def test_a_limit_that_leaves_no_path_is_refused_with_a_cure_that_does(desk: Desk
     assert desk.ask("change", "plan", changes=cure["changes"])["verdict"] == "safe"
 
 
+@pytest.mark.slow
 def test_a_wrong_number_stands_at_its_field(desk: Desk) -> None:
     desk.ask("hello", "plan")
     desk.ask("change", "error", changes={"limits.min_agl_m": -3})
@@ -186,6 +189,7 @@ def test_a_file_that_another_program_changed_is_not_overwritten(desk: Desk, file
     assert "46.512" in file.read_text()
 
 
+@pytest.mark.slow
 def test_a_file_that_is_broken_meanwhile_is_words_and_the_edits_stay(desk: Desk, file: Path) -> None:
     desk.ask("hello", "plan")
     file.write_text("version: [")
@@ -297,6 +301,7 @@ def test_ground_from_outside_the_folder_is_refused(tmp_path: Path, terrain: obje
         assert desk.ask("hello", "state")["stage"] == "empty"
 
 
+@pytest.mark.slow
 def test_a_via_keeps_its_height_where_it_moves_and_its_form_where_it_stays(file: Path) -> None:
     file.write_text(FLAT + '    via: ["46.503 N, 8.503 E", {at: "46.506, 8.507", agl_m: 80}]\n')
     with desk_of(file, file.parent) as desk:
@@ -308,6 +313,7 @@ def test_a_via_keeps_its_height_where_it_moves_and_its_form_where_it_stays(file:
     assert written == ["46.503 N, 8.503 E", {"lat": 46.507, "lon": 8.508, "agl_m": 80}]
 
 
+@pytest.mark.slow
 def test_a_limit_in_feet_is_changed_in_feet(file: Path) -> None:
     file.write_text(FLAT.replace("min_agl_m: 30", "min_agl_ft: 100"))
     with desk_of(file, file.parent) as desk:

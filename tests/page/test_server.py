@@ -38,6 +38,7 @@ def server(folder: Path) -> Iterator[MapServer]:
         yield server
 
 
+@pytest.mark.slow
 def test_the_page_and_its_parts_are_served_with_a_strict_policy(server: MapServer) -> None:
     script = "text/javascript"
     for path, kind in (("", "text/html"), ("lib/maplibre-gl.js", script), ("report/report.css", "text/css")):

@@ -89,7 +89,7 @@ def has_all(points: Floats, pinned: Bools, before: Floats, pinned_before: Bools)
     return np.array_equal(points[pinned], before[pinned_before])
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("objective", ["length", "energy"])
 @pytest.mark.parametrize("seed", range(6))
 def test_polished_paths_are_legal_no_dearer_and_keep_their_stops(seed: int, objective: Objective) -> None:
@@ -155,6 +155,7 @@ def test_points_on_a_straight_line_all_go_but_stops() -> None:
     assert still.all()
 
 
+@pytest.mark.slow
 def test_a_polished_path_past_one_wall_is_nearly_the_shortest() -> None:
     wall = Zone("wall", Circle(1000.0, 1000.0, 200.0))
     limits = Limits(min_agl_m=10.0)

@@ -232,6 +232,7 @@ def test_a_hostile_name_is_words_and_nothing_else() -> None:
     assert "</script><script>alert('x')</script>\"'><img src=x onerror=alert(1)>&amp;gnp.exe" in read.text
 
 
+@pytest.mark.slow
 @settings(max_examples=draws(60))
 @given(st.text(max_size=40))
 def test_any_words_survive_escaping_and_the_data_block(words: str) -> None:

@@ -34,6 +34,11 @@ def seeds(quick: int, slow: int, nightly: int) -> list[Any]:
     ]
 
 
+def alike(*values: object) -> list[Any]:
+    """Parameters for ``-m slow``: tests with them do much as with the others."""
+    return [pytest.param(value, marks=pytest.mark.slow) for value in values]
+
+
 def worlds(count: int) -> int:
     """The number of random worlds, which are slow to make, that this run takes out of ``count``: all or one."""
     return count if full else 1

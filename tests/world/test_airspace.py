@@ -152,7 +152,7 @@ def test_on_a_slope_the_track_error_costs_its_rise(scale: float) -> None:
     assert kinds(airspace, leg([1000, 100, roof + 0.001], [1000, 1900, roof + 0.001], track=8.0), limits) == {"max_agl"}
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(20))
 def test_beside_a_line_over_bent_ground_what_is_nearer_than_the_reach_counts(seed: int) -> None:
     """A leg in one cell whose corners do not lie in a plane, held against the heights at 200,000 places beside it."""

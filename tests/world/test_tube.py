@@ -225,6 +225,7 @@ def test_the_arms_of_a_polygon_make_two_spans_and_its_inside_one() -> None:
     assert graze[0].s0_m > 100.0
 
 
+@pytest.mark.slow
 @settings(max_examples=draws(60))
 @given(seed=st.integers(0, 2**32 - 1), kind=st.integers(0, 2))
 def test_a_hover_between_floor_and_ceiling_of_its_point_passes_the_check(seed: int, kind: int) -> None:

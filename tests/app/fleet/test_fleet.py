@@ -147,6 +147,7 @@ def test_a_single_vehicle_arrives_by_the_same_model_of_time() -> None:
 # -- separation ---------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_two_that_would_meet_are_kept_apart_and_their_arrivals_stay() -> None:
     done = planned({"mode": "together", "separation_m": 30})
     summary = summary_of(done)

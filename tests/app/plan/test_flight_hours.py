@@ -104,6 +104,7 @@ def test_a_flight_beyond_its_forecast_is_not_judged_however_it_is_checked(tmp_pa
         assert [note.code for note in judged.not_judged] == ["flies_beyond_forecast"]
 
 
+@pytest.mark.slow
 def test_gates_do_not_open_at_another_time_than_the_winds_were_read_for(tmp_path: Path) -> None:
     early = ["2026-11-28T09:10Z", "2026-11-28T09:30Z"]
     source = load_mission(mission_in_forecast(tmp_path / "f.json", early, (47.0, 8.02)))

@@ -96,6 +96,7 @@ def test_a_turn_of_the_sequence_stays_empty_for_one_that_is_in_the_way() -> None
     assert arrive_s[1] - arrive_s[0] == pytest.approx(10.0, abs=1e-2)
 
 
+@pytest.mark.slow
 def test_one_that_is_late_for_a_fixed_time_is_left_out() -> None:
     far = vehicle(6, -800, (4000, -800))
     whole = mission(far, *GOOD, arrive_s=150)
@@ -165,6 +166,7 @@ def test_a_refusal_names_all_and_explains_the_first() -> None:
     assert "and 35 more" in words
 
 
+@pytest.mark.slow
 def test_outputs_hold_none_of_those_left_out() -> None:
     files = outputs_of(plan(mission(GOOD[0], SHUT, GOOD[1]), leave_out=True))
     assert "uav2" not in files["mission.kml"]

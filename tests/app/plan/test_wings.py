@@ -432,6 +432,7 @@ def around(seed: int, count: int, most_deg: float) -> list[tuple[float, float]]:
     return places
 
 
+@pytest.mark.slow
 def test_two_vias_with_right_angles_are_passed_over_flat_ground() -> None:
     places = [(2000.0, 0.0), (2000.0, 1500.0), (4000.0, 1500.0)]
     assert_past_vias(over_flat(*places), places[:-1])
@@ -680,6 +681,7 @@ def test_a_straight_climb_of_kilometres_offers_circles_which_climb_near_the_star
     assert "this was tried: the mission is safe" in str(offer)
 
 
+@pytest.mark.slow
 def test_a_climbing_circle_whose_mission_is_not_safe_is_not_offered(monkeypatch: pytest.MonkeyPatch) -> None:
     real, tried = wings.built, []
 

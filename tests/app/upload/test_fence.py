@@ -92,6 +92,7 @@ def test_px4_has_two_distances(parameters: dict[str, float], words: str) -> None
     assert words in result.message
 
 
+@pytest.mark.slow
 def test_a_wing_levels_off_late_under_its_fence() -> None:
     done = planned(keys(**WING))
     extent = done.vehicles[0].verdict.extent

@@ -190,6 +190,7 @@ def test_a_zone_at_the_corner_is_passed_inside_and_one_inside_the_corner_is_hit(
     assert {f.kind for f in judged_with_disc(*inside, 13.0).findings} == {"zone"}
 
 
+@pytest.mark.slow
 def test_a_turn_that_begins_early_or_late_widens_its_arc_and_the_leg_behind_it() -> None:
     beside = (1500.0 - 30.0, 300.0)  # 30 m inside of the leg behind the corner
     assert judged_with_disc(*beside, 14.0).safe is True

@@ -140,6 +140,7 @@ def test_a_known_climb_out_takes_the_time_that_was_flown(
     assert sum(leg.horizontal_m for leg in legs if leg.seq == 1) == pytest.approx(ahead_m, abs=0.1)
 
 
+@pytest.mark.slow
 def test_a_known_climb_out_levels_off_within_two_seconds_of_its_climb() -> None:
     """With 4.6 m/s SITL rose 3 m too high, with a mean of 11.3 m/s 18.5 m; 8 m are the altitude error."""
     assert verdict(0.0, 1500.0, max_agl_m=92.0, climbs=ClimbOut(6.0, 20.0)).findings == ()

@@ -117,6 +117,7 @@ def test_turns_whose_bank_the_wind_makes_too_steep_are_not_judged() -> None:
     assert "arcs_too_banked" in [n.code for n in windy.not_judged]
 
 
+@pytest.mark.slow
 def test_a_climb_out_in_wind_is_longer_over_ground_and_wider() -> None:
     calm, windy = flown(wings.wing()), flown(blown(winds((5.0, 5.0), (180.0, 180.0))))
     notes = {n.code: n for n in windy.notes}
@@ -148,5 +149,6 @@ def test_no_circle_is_left_farther_than_its_reach(radius_m: float, speed_m_s: fl
     assert exact_m <= circle_reach_m(radius_m, 0.0, speed_m_s, wind_m_s) <= exact_m + 12.0
 
 
+@pytest.mark.slow
 def test_a_circle_of_any_radius_is_simulated_in_little_time() -> None:
     assert 1e6 * circle_growth(0.0) < circle_reach_m(1e6, 0.0, 20.0, 5.0) < 1e6 * circle_growth(0.0) + 1.0

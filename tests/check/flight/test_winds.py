@@ -175,12 +175,14 @@ def test_a_varying_wind_has_a_wider_window_than_one_that_is_constant() -> None:
     assert any_[0] <= one[0] <= one[1] < any_[1]
 
 
+@pytest.mark.slow
 def test_a_profile_over_height_counts_at_the_height_that_is_flown() -> None:
     levels = {"heights_m": np.array([300.0, 366.0, 500.0]), "heights": "amsl"}
     aloft = flown(blows(((0, 0), (6, 6), (30, 30)), ((90, 90),) * 3, **levels))  # type: ignore[arg-type]
     assert window_of(aloft)[1] == pytest.approx(window_of(flown(blows((6, 6), (90, 90))))[1], rel=1e-4)
 
 
+@pytest.mark.slow
 def test_a_forecast_counts_in_the_hours_of_the_flight() -> None:
     hours = {"times_s": np.array([0.0, 3600.0, 7200.0])}
     speed, from_deg = np.array([[[6.0, 6.0]], [[6.0, 6.0]], [[19.0, 19.0]]]), np.full((3, 1, 2), 90.0)

@@ -200,6 +200,7 @@ def test_over_a_zone_on_a_slope_the_climb_counts_the_ceiling_there_alone() -> No
     assert {s.zone for s in judged(under, m, v, 150.0).unsafe} == {"shelf"}
 
 
+@pytest.mark.slow
 def test_what_stays_unsafe_without_rally_points_is_no_matter_of_the_battery() -> None:
     w = world(300.0, [Zone("lid", Circle(1000.0, 0.0, 100.0), floor=Level(340.0, "amsl"))])
     home = judged(w, mission(w, [(0, 0, 20), (1000, 0, 20)]), vehicle(**BARE), 60.0)
@@ -453,6 +454,7 @@ def test_over_unknown_ground_no_return_is_safe() -> None:
     assert home.lowest_rel_home_m is None
 
 
+@pytest.mark.slow
 def test_max_agl_and_max_amsl_are_limits_but_not_obstacles() -> None:
     def dip(east: Floats, north: Floats) -> Floats:
         return 300.0 - 80.0 * np.exp(-((east - 1000.0) ** 2) / 4e4) + 0.0 * north
@@ -550,6 +552,7 @@ def test_words_know_one_from_many() -> None:
     ]
 
 
+@pytest.mark.slow
 def test_figures_are_plain_values_and_words() -> None:
     w = world(ridge, [Zone("shelf", Circle(1000.0, 0.0, 200.0), floor=Level(520.0, "amsl"))])
     v = vehicle(**BARE)

@@ -137,6 +137,7 @@ def test_a_plan_that_fails_saves_nothing(run: Any, tmp_path: Path) -> None:
     assert not (tmp_path / "field" / "uav1.plan").exists()
 
 
+@pytest.mark.slow
 def test_save_without_a_change_leaves_the_last_plan(run: Any, tmp_path: Path) -> None:
     file = tmp_path / "field.yaml"
     file.write_text(mission())

@@ -88,6 +88,7 @@ def test_files_that_begin_like_a_sample_are_completed_too(complete: Any, tmp_pat
     assert found[1:] == [f"sample:{name}" for name in sample_names()]
 
 
+@pytest.mark.slow
 def test_the_command_line_starts_without_what_completes_its_values() -> None:
     words = """
 import sys

@@ -66,6 +66,7 @@ def test_from_nothing_to_a_plan_by_the_commands_that_are_told(run: Any, served: 
     assert len(served.requests) == asked
 
 
+@pytest.mark.slow
 def test_a_mission_is_fetched_by_its_file(run: Any, served: Served) -> None:
     code, out, _ = run("dem", "fetch", "ridge.yaml", "--offline", "--json")
     assert code == 2

@@ -323,6 +323,7 @@ def test_vehicles_without_zones_keep_their_fence(monkeypatch: pytest.MonkeyPatch
     assert "fence" not in done.as_dict()
 
 
+@pytest.mark.slow
 def test_a_simulated_upload_sends_the_fence_too() -> None:
     where, craft = world(zones=MIXED), vehicle()
     job = job_of("uav1", 1, uploads.SIM, mission_in(where, craft), craft, where)

@@ -74,6 +74,7 @@ def packed(message: MissionMessage, source: Address = VEHICLE, target: Address =
     return FrameWriter(source).pack(wire.encode(message, target))
 
 
+@pytest.mark.slow
 @settings(max_examples=draws(200))
 @given(MESSAGES)
 def test_a_message_survives_the_wire_to_the_bit(message: MissionMessage) -> None:
@@ -123,6 +124,7 @@ def test_mavlink_1_frames_are_read() -> None:
 # -- frames -------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @settings(max_examples=draws(150))
 @given(st.lists(st.one_of(st.binary(max_size=40), MESSAGES), max_size=12), st.lists(st.integers(1, 50), max_size=30))
 def test_a_stream_cut_anywhere_gives_the_same_messages(parts: list[bytes | MissionMessage], cuts: list[int]) -> None:

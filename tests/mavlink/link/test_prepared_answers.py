@@ -287,6 +287,7 @@ def upload_to(peer: Asker, items: list[MissionItem], timers: Timers | None = Non
     return upload, done
 
 
+@pytest.mark.slow
 def test_any_order_repeats_and_other_talk_between_come_to_the_same() -> None:
     items = items_of(300)
     order = [*range(300), *range(300)]

@@ -185,6 +185,7 @@ def test_strange_requests_are_counted_and_what_waits_is_bounded() -> None:
     assert served.parts <= 64 * 56 + 20 * 56
 
 
+@pytest.mark.slow
 def test_the_vehicle_is_asked_for_its_requests_only_if_it_does_not_send_them() -> None:
     air = air_with_vehicle()
     asked: list[int] = []

@@ -43,6 +43,7 @@ def item(command: int, *params: float, frame: int = 3, z: float = 60.005, x: int
 # -- altitudes ----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @settings(max_examples=draws(500))
 @given(CENTIMETRES, st.sampled_from(list(Autopilot)))
 def test_exactly_the_wanted_centimetres_are_stored(cm: int, autopilot: Autopilot) -> None:
@@ -69,6 +70,7 @@ def test_an_altitude_that_cannot_be_kept_is_refused(cm: int) -> None:
     assert stored_cm(altitude_of_cm(int(math.copysign(8_299_999, cm)), COPTER)) == math.copysign(8_299_999, cm)
 
 
+@pytest.mark.slow
 @settings(max_examples=draws(500))
 @given(st.floats(-80_000, 80_000, width=32))
 def test_centimetres_are_cut_as_float32_hardware_cuts_them(altitude_m: float) -> None:
@@ -233,6 +235,7 @@ def test_px4_passes_raw_x_and_y_through_float32_without_a_frame() -> None:
     assert jump.params[:2] == (5.0, 4464.0)
 
 
+@pytest.mark.slow
 @settings(max_examples=draws(200))
 @given(ITEMS, st.sampled_from([*LOCATED, *PX4_PLACELESS]))
 def test_px4s_rules_agree_with_an_independent_reading_of_its_source(shape: MissionItem, command: int) -> None:

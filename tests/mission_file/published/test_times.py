@@ -57,6 +57,7 @@ PERIOD = st.fixed_dictionaries(
 )
 
 
+@pytest.mark.slow
 @given(st.lists(PERIOD, min_size=1, max_size=2), st.integers(0, 6 * 96), st.integers(1, 40))
 @settings(max_examples=draws(200), deadline=None)
 def test_periods_against_every_minute(given_: list[Any], first: int, quarters: int) -> None:

@@ -123,6 +123,7 @@ def test_decimal_degrees_are_exact_to_the_digit(lat: int, lon: int, digits: int)
     assert degrees(letters) == (lat_deg, lon_deg)
 
 
+@pytest.mark.slow
 @settings(max_examples=draws(300))
 @given(st.integers(-324_000_000, 324_000_000), st.integers(-648_000_000, 648_000_000), st.sampled_from("'′’"),
        st.sampled_from(["\"", "″", "”", "''"]), st.sampled_from(["", " "]), st.booleans())  # fmt: skip
@@ -408,6 +409,7 @@ def test_a_vehicle_without_a_space_after_its_colon_is_told() -> None:
     assert "`version: 1`" in problems("version:1\n")[0].message
 
 
+@pytest.mark.slow
 def test_the_examples_of_the_reference_are_read() -> None:
     """Each form in the table of docs/reference/mission-file.md, near the same place."""
     page = (REPOSITORY / "docs" / "reference" / "mission-file.md").read_text(encoding="utf-8")

@@ -126,6 +126,7 @@ def test_one_note_says_each_value_in_the_keys_own_unit():
     )
 
 
+@pytest.mark.slow
 def test_notes_on_a_fleet_are_few():
     content = mission()
     first = content["vehicles"][0]

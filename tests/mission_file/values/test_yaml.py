@@ -132,6 +132,7 @@ def test_no_cure_is_guessed(text: str) -> None:
     assert "`" not in refusal(text)
 
 
+@pytest.mark.slow
 @settings(max_examples=draws(300))
 @given(
     st.text(st.sampled_from("ab:{}[],&*|>'\"#%@`-?\n\t 1.\u00a0°"), max_size=60), st.integers(0, 9), st.integers(0, 9)

@@ -88,6 +88,7 @@ def test_an_error_is_the_range_around_the_number(speed: float, more: float, turn
     assert np.cos(np.radians((low + high) / 2 - turn)) == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 @given(st.floats(0, 360), st.floats(0, 360))
 def test_a_range_of_directions_goes_clockwise(first: float, second: float) -> None:
     low, high = load({"speed_m_s": 3, "from_deg": [first, second]}).wind.from_deg[0, 0]

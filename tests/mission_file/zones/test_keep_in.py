@@ -243,6 +243,7 @@ def test_areas_and_their_holes_count_in_the_hash_of_the_zones(tmp_path: Path) ->
     assert zones_sha256(found) != plain.inputs["zones_sha256"]
 
 
+@pytest.mark.slow
 def test_inside_a_kml_edge_is_what_its_line_and_its_great_circle_enclose(tmp_path: Path) -> None:
     """Along 46° N a great circle over 4° of longitude lies 1.2 km north of the straight line."""
     corners = "14,46,0 18,46,0 18,47,0 14,47,0 14,46,0"

@@ -249,6 +249,7 @@ def test_every_spelling_of_a_level_gives_the_same_zone(
     assert ("R (" in notes(found)) == (not ours)  # how it was read is told
 
 
+@pytest.mark.slow
 @settings(max_examples=draws(200), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     st.dictionaries(

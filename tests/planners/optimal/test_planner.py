@@ -187,6 +187,7 @@ def test_a_maximum_agl_over_level_ground_is_a_maximum_amsl() -> None:
     assert found.notes == ()
 
 
+@pytest.mark.slow
 def test_zone_with_a_low_ceiling_is_flown_over_and_one_with_a_high_floor_under() -> None:
     over = Zone("mast", Circle(600.0, 1000.0, 150.0), None, Level(60.0, "agl"))
     under = Zone("airway", Circle(1400.0, 1000.0, 150.0), Level(40.0, "agl"), Level(900.0, "agl"))
@@ -197,6 +198,7 @@ def test_zone_with_a_low_ceiling_is_flown_over_and_one_with_a_high_floor_under()
     assert np.interp(1400.0, east, amsl) <= 45.0
 
 
+@pytest.mark.slow
 def test_zones_one_over_the_other_are_passed_in_between() -> None:
     low = Zone("low", Circle(1000.0, 1000.0, 900.0), None, Level(60.0, "amsl"))
     high = Zone("high", Circle(1000.0, 1000.0, 900.0), Level(90.0, "amsl"), None)
@@ -226,6 +228,7 @@ def test_via_points_are_passed_in_order_and_at_their_heights() -> None:
     assert s.lower_bound == pytest.approx(math.hypot(800, 500) + math.hypot(500, 900) + math.hypot(300, 400), rel=0.01)
 
 
+@pytest.mark.slow
 def test_round_trip_over_a_via_and_a_via_on_the_start_are_flown() -> None:
     s = solve(problem(ground(0.0), via=(Via(1500.0, 1000.0),), goal=(200.0, 1000.0, 20.0)))
     assert s.path.length_m == pytest.approx(2600.0)

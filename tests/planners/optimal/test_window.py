@@ -119,6 +119,7 @@ def test_two_plans_are_the_same_to_the_last_bit() -> None:
 # -- windows of a mission file -----------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_raster_tells_on_which_sides_it_goes_on() -> None:
     source = source_of(ROW_4)
     assert source.surface.goes_on == ALL_SIDES
@@ -195,6 +196,7 @@ def test_the_cost_of_leaving_is_that_of_the_shortest_way_over_the_border(seed: i
     assert true - 4.0 * 230.0 < exit_cost(p) <= true
 
 
+@pytest.mark.slow
 def test_paths_that_keep_within_the_margin_for_a_cost_are_all_of_that_cost() -> None:
     rng = np.random.default_rng(3)
     p = Problem(flat(50_000.0), LOW, (-1000.0, 0.0, 60.0), (1500.0, 700.0, 60.0), (Via(400.0, -300.0),))

@@ -79,6 +79,7 @@ def test_an_end_climbs_towards_the_path_to_where_min_agl_is_met_or_as_high_as_as
         assert end.leaves is end.top
 
 
+@pytest.mark.slow
 def test_the_nearest_legal_headings_come_first_and_a_wanted_one_is_the_only_one() -> None:
     headings = [round(math.degrees(end.heading)) for end in straight_ends(problem(), required(), SHARP)]
     assert headings[:5] == [0, 15, -15, 30, -30]

@@ -82,6 +82,7 @@ def evaluated(name: str, cost: Callable[[Floats], Floats], dim: int) -> tuple[Fl
     return got, np.asarray(wanted)
 
 
+@pytest.mark.slow
 def test_each_reading_differs_from_what_is_decided() -> None:
     cost = FUNCTIONS["f7"].on_unit_box(DIM, shifted=True)
     for name, (optimiser, parameters, _) in READINGS.items():

@@ -12,6 +12,7 @@ from gcsplan.arrays import Floats
 from gcsplan.research.optimisers.driver import OptimiserResult, minimise
 from gcsplan.research.optimisers.functions import FUNCTIONS
 from gcsplan.research.optimisers.registry import OPTIMISERS, get, names
+from tests.support.effort import alike
 
 every = pytest.mark.parametrize("name", names())
 DIM, BUDGET, RUNS = 30, 6000, 3
@@ -37,7 +38,9 @@ def broken(x: Floats) -> Floats:
 
 @every
 @pytest.mark.parametrize("cost", [corner, flat, broken])
-@pytest.mark.parametrize("budget", [{"iterations": 6}, {"evaluations": 1003}, {"iterations": 400, "evaluations": 777}])
+@pytest.mark.parametrize(
+    "budget", [{"iterations": 400, "evaluations": 777}, *alike({"iterations": 6}, {"evaluations": 1003})]
+)
 def test_it_keeps_its_bounds_and_uses_exactly_its_budget(
     name: str, cost: Callable[[Floats], Floats], budget: dict[str, int]
 ) -> None:
@@ -96,7 +99,7 @@ def test_the_same_seed_gives_the_same_bytes_and_another_seed_other_ones(name: st
     assert first.x.tobytes() != other.x.tobytes()
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @every
 @pytest.mark.parametrize("function", [pytest.param("f1", marks=pytest.mark.slow), "f7"])
 def test_it_beats_random_search_of_equal_evaluations_or_its_row_says_why_not(name: str, function: str) -> None:

@@ -148,6 +148,7 @@ def taken(f: float, f_new: float, temperature: float, rand: float) -> bool:
     return f_new < f or rand < math.exp(-(f_new - f) / temperature)
 
 
+@pytest.mark.slow
 def test_ssgwo_with_leaders_apart_moves_them_by_eq_17_to_19_and_wolves_by_eq_23() -> None:
     n, long = 12, 60
     x = crowd(n, D, seed=5)

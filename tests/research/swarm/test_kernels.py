@@ -83,6 +83,7 @@ def test_machine_code_gives_what_python_gives(objective: str, points: int) -> No
     np.testing.assert_allclose(cost.terms(controls), plain_terms(cost, controls), rtol=1e-9, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_no_sum_of_what_is_shipped_may_still_be_reordered_or_fused() -> None:
     """Otherwise the result of a swarm would depend on the processor's instructions."""
     bitcode = cache.read_shipped(UNIT.shipped, UNIT.digest())

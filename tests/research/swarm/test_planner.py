@@ -60,7 +60,7 @@ def test_every_swarm_solves_a_toy_map_and_says_what_it_did(name: str) -> None:
     assert solution.lower_bound is None
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "encoding", ["box", "sections", "sections-whole", "polar", "polar-signed", "bspline", "offsets"]
 )
@@ -186,7 +186,7 @@ def test_a_repaired_curve_passes_its_via_points() -> None:
     assert np.hypot(*(mended.points[:, :2] - (1350.0, 1250.0)).T).min() < 1e-3
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(6))
 def test_what_is_repaired_passes_on_real_ground(seed: int) -> None:
     problem = random_mission(seed, replace(FIELD, max_amsl_m=900.0))

@@ -131,6 +131,7 @@ def test_great_circles_of_one_zone_are_bounded() -> None:
         near_polygons(zigzag, FRAME, great_circles=True)
 
 
+@pytest.mark.nightly
 def test_long_edges_beside_each_other_are_counted_before_great_circles_are_joined() -> None:
     teeth = [(46.5 + 1e-6 * (k // 2 + 1), 8.0 + 0.5 * (-1) ** ((k + 1) // 2)) for k in range(400)]
     comb = [*teeth, (47.0, 8.7), (46.4, 8.7)]  # 0.1 m apart: each great circle crosses hundreds of straight edges

@@ -169,6 +169,7 @@ def test_the_centre_lies_in_the_middle_rounded_to_a_ten_thousandth() -> None:
     assert centre_of([36.60004], [-84.30006]) == (36.6, -84.3001)
 
 
+@pytest.mark.slow
 @settings(max_examples=draws(200))
 @given(latitudes, longitudes, st.lists(st.tuples(st.floats(-2, 2), st.floats(-2, 2)), min_size=1, max_size=6))
 def test_the_centre_is_near_all_points_even_across_the_antimeridian(

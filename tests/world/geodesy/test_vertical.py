@@ -287,6 +287,7 @@ def holed(value: float, beside: float = 0.0) -> Any:
     return heights
 
 
+@pytest.mark.nightly
 def test_a_patch_of_zeros_without_a_shore_is_a_void_and_named(tmp_path: Path) -> None:
     path = degrees_tif(tmp_path / "a.tif", holed(0.0))
     surface = load(path)

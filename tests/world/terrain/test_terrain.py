@@ -344,6 +344,7 @@ def test_the_antimeridian_is_no_edge(tmp_path: Path, lon_deg: float, layout: str
     assert np.abs(surface.ground_at(e, n) - wanted).max() < 1e-5
 
 
+@pytest.mark.slow
 def test_only_the_part_that_the_box_needs_is_read(tmp_path: Path) -> None:
     path = degrees_tif(tmp_path / "a.tif", hills(1000, 1000), west=-85.5, north=37.5)
     rows, cols = load(path, box=(-100.0, -100.0, 100.0, 100.0)).ground_m.shape

@@ -402,6 +402,7 @@ def test_parameters_that_are_no_numbers_are_said_and_end_nothing() -> None:
     assert "parameter_is_no_number" not in [w.code for w in results[1].warnings]
 
 
+@pytest.mark.slow
 def test_a_bug_in_one_vehicles_job_leaves_the_others_standing() -> None:
     def broken(_: Mission, __: object) -> Note | None:
         raise ZeroDivisionError("a bug")

@@ -260,6 +260,7 @@ def ridge_behind_a_low_ceiling() -> tuple[Leg, Problem]:
     return leg, leg.problem
 
 
+@pytest.mark.slow
 def test_a_ridge_right_behind_a_low_ceiling_is_farther_than_the_plane_tells() -> None:
     leg, problem = ridge_behind_a_low_ceiling()
     for slack in (0.0, 1.3):  # the first flood finds how far the second must reach
