@@ -63,7 +63,7 @@ def test_a_changed_session_writes_the_bytes_of_the_command_line(tmp_path: Path) 
     assert filecmp.cmpfiles(tmp_path / "here", tmp_path / "there", names, shallow=False)[1:] == ([], [])
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_changes_count_from_then_on_or_for_one_plan_alone() -> None:
     session = Planner(LEGS)
     before = figures(session.plan())
@@ -77,7 +77,7 @@ def test_changes_count_from_then_on_or_for_one_plan_alone() -> None:
     assert session.plan().vehicles[0].verdict.length_m > 900
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_an_area_to_stay_in_is_added_and_removed_by_its_name() -> None:
     session = Planner(LEGS)
     before = figures(session.plan())
@@ -96,7 +96,7 @@ def test_values_may_be_tuples_and_numbers_of_numpy() -> None:
     assert session.plan().vehicles[0].verdict.lowest.min_agl_m >= 40.0  # type: ignore[union-attr]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_zones_and_terrain_of_objects_are_changed_like_keys() -> None:
     vehicle = {"name": "u", "sysid": 1, "autopilot": "arducopter", "start": [36.50, -84.3], "goal": [36.52, -84.3]}
     level = {**TERRAIN, "dem": np.full_like(TERRAIN["dem"], 300.0)}
@@ -157,7 +157,7 @@ def test_each_path_is_better_than_the_one_before_and_each_bound_holds() -> None:
     assert np.hypot(paths[0].lat_deg[0] - start[0], paths[0].lon_deg[0] - start[1]) < 1e-4
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_what_a_callback_raises_ends_the_plan_and_not_the_session() -> None:
     session = Planner(LEGS)
 
@@ -211,7 +211,7 @@ def test_cancelling_ends_the_plans_that_wait_too() -> None:
     assert ended == [Cancelled] * 5
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_an_awaited_plan_is_the_same_and_ends_with_its_task() -> None:
     session = Planner(LEGS)
 
@@ -306,7 +306,7 @@ def test_memory_stays_flat_over_some_changes() -> None:
     assert grown_bytes(100) < 300_000
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_zones_of_objects_never_take_each_others_places() -> None:
     def feature(name: str, east: float) -> dict[str, Any]:
         ring = [[-84.31 + east, 36.51], [-84.3095 + east, 36.51], [-84.3095 + east, 36.511], [-84.31 + east, 36.51]]
@@ -329,7 +329,7 @@ def test_zones_of_objects_never_take_each_others_places() -> None:
     assert names() == ["f", "c", "e"]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_forecast_counts_as_it_was_read_until_the_session_reloads(tmp_path: Path) -> None:
     def gusts(kmh: float) -> Path:
         file = tmp_path / "wind.json"
@@ -356,7 +356,7 @@ def test_a_forecast_counts_as_it_was_read_until_the_session_reloads(tmp_path: Pa
     assert session.plan().source.wind.gust_m_s == pytest.approx((before or 0.0) + 1.0)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_session_plans_over_what_it_read_until_it_reloads(tmp_path: Path) -> None:
     zone = tmp_path / "zones.geojson"
     zone.write_text(json.dumps(FEATURE), encoding="utf-8")

@@ -73,7 +73,7 @@ def parts(folder: Path) -> list[str]:
 # -- tiles -------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_tiles_come_with_their_records_and_once_only(served: Served, tmp_path: Path) -> None:
     first = fetch(served, tmp_path, *FOUR)
     assert [f.cached for f in first] == [False] * 4
@@ -158,7 +158,7 @@ def test_what_is_no_such_tile_is_removed(served: Served, tmp_path: Path, make: C
     assert is_in_order(tmp_path) == set()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_tile_damaged_in_the_cache_is_brought_again(served: Served, tmp_path: Path) -> None:
     fetch(served, tmp_path, FOUR[0])
     path = tmp_path / "copernicus-glo30" / "N36W085.tif"
@@ -197,7 +197,7 @@ def state(served: Served, folder: Path, cell: Cell, source: DemSource = GLO30) -
     return fetch(served, folder, cell, source=source)[0].record.state
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_sea_is_what_neither_list_has(served: Served, tmp_path: Path) -> None:
     assert state(served, tmp_path, SEA) == "sea"
     assert state(served, tmp_path, LACKING) == "absent"
@@ -209,7 +209,7 @@ def test_sea_is_what_neither_list_has(served: Served, tmp_path: Path) -> None:
     assert served.paths() == []
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_srtm_has_a_list_and_a_datum_of_its_own(served: Served, tmp_path: Path) -> None:
     served.put_lists(land=FOUR, lacking=[LACKING], source=SRTM)
     served.put_tile(FOUR[0], SRTM)
@@ -330,7 +330,7 @@ def test_a_process_that_is_killed_leaves_no_tile_and_the_next_one_goes_on(served
     assert is_in_order(tmp_path) == {cell.name for cell in FOUR}
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_an_interruption_in_the_middle_keeps_what_is_right(served: Served, tmp_path: Path) -> None:
     def stop(name: str, have: int, whole: int | None) -> None:
         if name == FOUR[1].name:

@@ -298,7 +298,7 @@ def test_a_check_without_a_mission_takes_a_source_too(cache: Path) -> None:
     assert inputs["dem_source"] == "copernicus-glo30"
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_tiles_of_a_mission_are_those_of_its_first_window(cache: Path) -> None:
     hold(cache, Cell(36, -85))
     read = load_mission(mission())

@@ -76,7 +76,7 @@ def test_the_report_is_small_and_reaches_nowhere() -> None:
     assert policy.startswith("default-src 'none'; img-src data:;")
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_same_plan_gives_the_same_bytes() -> None:
     assert render(planned()) == planned_page()
 
@@ -108,7 +108,7 @@ def test_every_figure_and_table_can_be_read_by_somebody_who_sees_none_of_it() ->
 # -- verdicts -----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_broken_limit_is_told_at_the_top_and_marked_where_it_is() -> None:
     page = small_page(low_m=350.0)
     verdict = page.subjects[0].verdict
@@ -123,7 +123,7 @@ def test_a_broken_limit_is_told_at_the_top_and_marked_where_it_is() -> None:
     assert any(a.get("class") == "bad" for t, a in read.elements if t == "tr")
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_what_could_not_be_judged_is_neither_safe_nor_unsafe() -> None:
     page = small_page()
     arcs = replace(page.subjects[0].verdict, not_judged=(saying("the arcs <b> of 80 m"),))
@@ -133,7 +133,7 @@ def test_what_could_not_be_judged_is_neither_safe_nor_unsafe() -> None:
     assert "Every metre was checked" not in read.text
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_mission_that_flies_nowhere_still_has_a_report() -> None:
     page = small_page()
     nothing = replace(page.subjects[0].verdict, legs=(), not_judged=(Note("flies_nowhere"),))
@@ -150,7 +150,7 @@ def test_obstacle_heights_silence_the_bare_dem_line_and_nothing_else_does() -> N
     assert BARE_DEM not in render_page(replace(page, inputs={"bare_dem": False}))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_surface_model_is_not_called_bare() -> None:
     shown = render_page(replace(small_page(), inputs={"bare_dem": False, "dem_kind": "surface"}))
     assert SURFACE_DEM in shown
@@ -158,7 +158,7 @@ def test_a_surface_model_is_not_called_bare() -> None:
     assert "obstacle heights were given" not in shown
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_unknown_ground_is_left_out_of_the_heights_and_told() -> None:
     page = small_page()
     where = world(lambda e, n: np.where(e > 3000, np.nan, hills(e, n)), half_m=8000.0)
@@ -171,7 +171,7 @@ def test_unknown_ground_is_left_out_of_the_heights_and_told() -> None:
     assert None in read.data["lines"][0]["g"]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_checked_file_is_named_by_itself_where_one_vehicle_has_several() -> None:
     @dataclass
     class Checked:

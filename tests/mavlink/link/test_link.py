@@ -168,7 +168,7 @@ def test_no_flipped_bit_gets_through() -> None:
             assert wire.decode(message) is None
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_parser_never_holds_more_than_a_frame() -> None:
     rng = random.Random(1)
     parser = FrameParser()

@@ -287,7 +287,7 @@ def upload_to(peer: Asker, items: list[MissionItem], timers: Timers | None = Non
     return upload, done
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_any_order_repeats_and_other_talk_between_come_to_the_same() -> None:
     items = items_of(300)
     order = [*range(300), *range(300)]
@@ -328,7 +328,7 @@ def test_the_machine_hears_of_prompt_answers_before_it_hears_of_what_came_after_
     assert upload.retries == 0
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_timers_run_while_a_vehicle_asks_without_an_end() -> None:
     stop = threading.Event()
 
@@ -358,7 +358,7 @@ def test_a_vehicle_that_falls_silent_in_the_middle_is_noticed() -> None:
     assert str(upload.outcome) == "unknown: the vehicle fell silent after asking for 50 of 100 items"
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_vehicles_on_one_port_and_on_several_are_uploaded_to_together() -> None:
     def vehicle(n: int, autopilot: Autopilot) -> LoopbackVehicle:
         return LoopbackVehicle(n, autopilot, lat_deg=36.6, lon_deg=-84.3, amsl_m=300.0)

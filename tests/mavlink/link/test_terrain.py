@@ -83,7 +83,7 @@ def places(count: int, reach_deg: float = 0.06) -> list[tuple[int, int]]:
     return list(zip(lat.astype(int).tolist(), lon.astype(int).tolist(), strict=True))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("loss", "spacing_m"),
     [(0.0, 100), pytest.param(0.2, 100, marks=pytest.mark.slow), pytest.param(0.0, 30, marks=pytest.mark.slow)],
@@ -116,7 +116,7 @@ def test_what_it_reads_is_what_was_sent() -> None:
     assert result.worst_at is not None
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_other_terrain_on_board_is_seen() -> None:
     air = air_with_vehicle()
     with air.link() as link:
@@ -126,7 +126,7 @@ def test_other_terrain_on_board_is_seen() -> None:
     assert result.worst_m == pytest.approx(7.0, abs=0.001)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_unknown_ground_is_not_sent_and_told() -> None:
     def half(lat_deg: Floats, lon_deg: Floats) -> Floats:
         return np.where(lat_deg > AT[0], np.nan, 300.0)
@@ -185,7 +185,7 @@ def test_strange_requests_are_counted_and_what_waits_is_bounded() -> None:
     assert served.parts <= 64 * 56 + 20 * 56
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_vehicle_is_asked_for_its_requests_only_if_it_does_not_send_them() -> None:
     air = air_with_vehicle()
     asked: list[int] = []
@@ -223,7 +223,7 @@ def uploaded(air: Air, ground: GroundHeights | None, **more: object) -> tuple[Up
         return upload_mission(link, mission(), options=options, judge=judge), told
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_an_upload_serves_the_terrain_and_measures_what_the_vehicle_reads() -> None:
     result, values = uploaded(air_with_vehicle(), hills)
     assert result.outcome == "accepted"
@@ -233,7 +233,7 @@ def test_an_upload_serves_the_terrain_and_measures_what_the_vehicle_reads() -> N
     assert terrain_error_m(values, 30.0) == pytest.approx(30.0, abs=0.001)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_an_upload_goes_on_without_terrain_and_says_so() -> None:
     result, values = uploaded(air_with_vehicle(), lambda a, o: np.full(np.shape(a), np.nan))
     assert result.outcome == "accepted"

@@ -120,7 +120,7 @@ def delivered(
     return {d.vehicle: d for d in done}, boards, told
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_one_failure_leaves_the_others_results_standing(monkeypatch: pytest.MonkeyPatch) -> None:
     done, boards, told = delivered({2: {"refuse": 3}, 3: {"corrupt": 4}}, monkeypatch, atomic=False)
     assert [d.verified for d in done.values()] == [True, False, False, True]
@@ -133,7 +133,7 @@ def test_one_failure_leaves_the_others_results_standing(monkeypatch: pytest.Monk
     assert {progress.failed for _, progress in told if progress.phase in ("upload", "read back")} == {None}
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_all_or_nothing_takes_back_what_the_others_took_and_reads_that_back(monkeypatch: pytest.MonkeyPatch) -> None:
     done, boards, _ = delivered({2: {"refuse": 3}}, monkeypatch)
     assert {n: d.outcome for n, d in done.items()} == {
@@ -153,7 +153,7 @@ def test_all_or_nothing_changes_nothing_where_all_went_well(monkeypatch: pytest.
     assert uploads.exit_code(list(done.values())) == 0
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_what_read_back_wrong_is_cleared_as_well(monkeypatch: pytest.MonkeyPatch) -> None:
     done, boards, _ = delivered({3: {"corrupt": 4}}, monkeypatch)
     assert done["uav3"].outcome == "withdrawn"
@@ -162,7 +162,7 @@ def test_what_read_back_wrong_is_cleared_as_well(monkeypatch: pytest.MonkeyPatch
     assert uploads.exit_code(list(done.values())) == 7
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_vehicle_that_keeps_its_mission_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     clear = session.clear_fleet
 

@@ -58,7 +58,7 @@ def areas(source: MissionFile) -> list[str]:
     return [area.name for area in keep_in_of(source.zones)]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_plan_stays_inside_with_its_errors_and_clearance() -> None:
     made = plan(load_mission(mission([{"name": "bend", "polygon": BEND}])))
     (vehicle,) = made.vehicles
@@ -73,7 +73,7 @@ def test_a_plan_stays_inside_with_its_errors_and_clearance() -> None:
     assert vehicle.solution.lower_bound > 2600.0  # the straight line has 2.2 km
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_finding_names_the_area_that_a_mission_leaves_once() -> None:
     free = plan(load_mission(mission(None)))
     kept = plan(load_mission(mission([{"name": "bend", "polygon": BEND}])))
@@ -86,7 +86,7 @@ def test_a_finding_names_the_area_that_a_mission_leaves_once() -> None:
     assert 400.0 < finding.by < 800.0
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_two_areas_that_share_an_edge_are_flown_through() -> None:
     south, north = [*BEND[:3], [46.003, 14.0]], [[46.003, 14.0], BEND[3], BEND[4], BEND[5]]
     both = [{"name": "south", "polygon": south}, {"name": "north", "polygon": north}]
@@ -110,7 +110,7 @@ def test_a_start_outside_is_refused_with_the_nearest_area_and_its_distance() -> 
         plan(load_mission(mission([{"name": "bend", "polygon": BEND}], vehicle={"start": [46.00294, 14.018]})))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_ceiling_keeps_the_flight_below_it_with_the_vertical_clearance() -> None:
     kept = [{"name": "bend", "polygon": BEND, "ceiling_agl_m": 50}]
     made = plan(load_mission(mission(kept, limits={"vertical_clearance_m": 15.0})))
@@ -243,7 +243,7 @@ def test_areas_and_their_holes_count_in_the_hash_of_the_zones(tmp_path: Path) ->
     assert zones_sha256(found) != plain.inputs["zones_sha256"]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_inside_a_kml_edge_is_what_its_line_and_its_great_circle_enclose(tmp_path: Path) -> None:
     """Along 46° N a great circle over 4° of longitude lies 1.2 km north of the straight line."""
     corners = "14,46,0 18,46,0 18,47,0 14,47,0 14,46,0"

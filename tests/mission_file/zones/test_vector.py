@@ -152,7 +152,7 @@ def test_holes_heights_and_collections_are_as_in_geojson(tmp_path: Path) -> None
     assert str(note) == "z.gpkg: the altitudes of corners are not read as limits: a/2 (up to 500 m)"
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_an_arc_is_drawn_so_finely_that_its_chords_are_the_arc(tmp_path: Path) -> None:
     file = write(tmp_path / "z.gpkg", [SQUARE], "EPSG:32632", SPATIAL_INDEX="NO")
     x, y, r = 500_000.0, 5_200_000.0, 40_000.0
@@ -169,7 +169,7 @@ def test_an_arc_is_drawn_so_finely_that_its_chords_are_the_arc(tmp_path: Path) -
     assert ring.distance(shapely.Point(x, y)) > r - 0.03
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_every_layer_of_a_geopackage_is_read_unless_one_is_named(tmp_path: Path) -> None:
     file = write(tmp_path / "z.gpkg", [SQUARE], layer="zones", name=["a"])
     write(file, [shapely.Point(8.0, 46.5)], layer="masts", append=True, name=["b"], radius_m=[9.0])

@@ -95,7 +95,7 @@ def crowd(seed: int) -> list[dict[str, float | bool]]:
     ]  # fmt: skip
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_no_label_lies_on_a_label_a_symbol_or_the_rim() -> None:
     crowds = [crowd(seed) for seed in range(20)]
     corner = [0.0, 0.0, 60.0, 40.0]

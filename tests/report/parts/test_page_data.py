@@ -32,7 +32,7 @@ def with_room(subject: Subject, min_agl_m: float) -> Subject:
     return replace(subject, verdict=replace(subject.verdict, legs=legs))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_of_a_larger_fleet_those_with_problems_and_least_room_are_shown() -> None:
     page = many_page(MOST_WHOLE + 1)
     rng = np.random.default_rng(1)

@@ -38,7 +38,7 @@ def test_samples_stand_on_the_line_and_hold_the_end_of_every_leg() -> None:
     assert (line.amsl_m[flown] > line.floor_m[flown]).all()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_zones_are_passed_over_and_under_and_the_far_one_is_not_passed() -> None:
     page = small_page()
     subject = page.subjects[0]

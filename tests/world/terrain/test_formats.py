@@ -87,7 +87,7 @@ def test_a_vrt_that_leads_elsewhere_is_refused(folder: Path, tmp_path: Path, old
         open_raster(file, where="m")
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_packed_tile_that_unpacks_to_more_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "N46E014.hgt.gz"
     with gzip.open(file, "wb") as packed:

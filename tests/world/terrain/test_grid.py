@@ -93,7 +93,7 @@ def test_no_post_lies_below_the_ground_and_none_a_metre_above_it() -> None:
     assert (PostHeights(grid, lambda a, o: 0 * a + 300.0 + 1e-9).block(block) == 300.0).all()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_blocks_of_a_box_are_those_of_all_its_points() -> None:
     grid = TerrainGrid()
     for lat, lon, reach in ((36.55, -84.4, 0.1), (-33.02, 151.98, 0.1), (0.001, -0.001, 0.05), (61.0, 179.95, 0.2)):

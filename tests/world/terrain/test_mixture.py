@@ -86,7 +86,7 @@ def test_ground_that_no_layer_knows_all_over_a_cell_is_unknown() -> None:
     assert (found.heights_m[:, :3] == 50.0).all()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_sea_is_ground_at_zero_where_no_tile_knows_any_but_not_beside_cliffs(tmp_path: Path) -> None:
     layout = next(one for one in layouts(3, 4.0) if one.name == "at a sea")
     low = replace(layout.files[0], ground=hills(3, 0.02, 1.0), half_m=600.0, holes=[(0.0, 0.0, 90.0)])
@@ -109,7 +109,7 @@ def test_the_finest_comes_first_and_cells_that_are_much_too_long_are_refused() -
         mixed([b, TerrainLayer(long, 30.0, "strips")])
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_files_on_too_many_grids_are_refused_with_a_cure(tmp_path: Path) -> None:
     file = replace(layouts(1)[0].files[0], half_m=100.0)
     paths = []

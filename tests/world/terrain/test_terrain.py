@@ -196,7 +196,7 @@ def hgt(path: Path, posts: Floats) -> Path:
     return path
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_srtm_posts_lie_on_whole_degrees_and_neighbouring_tiles_join(tmp_path: Path) -> None:
     both = hills(2401, 1201)
     tiles = [hgt(tmp_path / "N36W085.hgt", both[:, :1201]), hgt(tmp_path / "N36W084.hgt", both[:, 1200:])]
@@ -212,7 +212,7 @@ def test_srtm_posts_lie_on_whole_degrees_and_neighbouring_tiles_join(tmp_path: P
     assert surface.info["dem_sha256"] == hashlib.sha256("\n".join(hashes).encode()).hexdigest()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_zipped_hgt_as_mavproxy_keeps_it_is_the_same_ground(tmp_path: Path) -> None:
     posts = hills(1201, 1201)
     posts[7, 9] = -32768
@@ -344,7 +344,7 @@ def test_the_antimeridian_is_no_edge(tmp_path: Path, lon_deg: float, layout: str
     assert np.abs(surface.ground_at(e, n) - wanted).max() < 1e-5
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_only_the_part_that_the_box_needs_is_read(tmp_path: Path) -> None:
     path = degrees_tif(tmp_path / "a.tif", hills(1000, 1000), west=-85.5, north=37.5)
     rows, cols = load(path, box=(-100.0, -100.0, 100.0, 100.0)).ground_m.shape
@@ -690,7 +690,7 @@ def test_a_second_band_is_told(tmp_path: Path) -> None:
     assert any("2 bands" in str(n) for n in notes_on(load(degrees_tif(tmp_path / "a.tif", two)).info))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_tiles_that_do_not_fit_together_are_layers(tmp_path: Path) -> None:
     first = degrees_tif(tmp_path / "a.tif")
     finer = tif(tmp_path / "b.tif", hills(100, 100), from_origin(-84.6, 36.6, 0.001, 0.001))
@@ -925,7 +925,7 @@ def test_a_canopy_is_never_under_estimated(tmp_path: Path, crs: str, cell: float
     assert "canopy_sha256" in surface.info
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_lone_tree_stands_in_the_cells_that_it_meets_and_nowhere_else(tmp_path: Path) -> None:
     trees = np.zeros((1000, 1000), "uint8")
     trees[500, 500] = 30
@@ -937,7 +937,7 @@ def test_a_lone_tree_stands_in_the_cells_that_it_meets_and_nowhere_else(tmp_path
     assert surface.top_at(0.0, 0.0) - surface.ground_at(0.0, 0.0) == pytest.approx(30.0, abs=1e-6)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_unknown_canopy_is_unknown_unless_its_height_is_given(tmp_path: Path) -> None:
     trees = np.full((1000, 1000), 10, "uint8")
     trees[500, 500] = 255
