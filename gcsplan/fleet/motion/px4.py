@@ -123,10 +123,8 @@ class Smoothed:
         length = np.diff(switches)
         turning = np.minimum(np.append(0.0, slow[:-1] * law.turning_s(self.turn, slow[:-1])), 0.5 * length)
         leg = _Leg(law, first, top, length - turning, cut, corner, base, slow)
-        (late, late_m_s), (early, early_m_s) = leg.late(), leg.early()
-        share = leg.early_share()
-        before = np.vstack([length, (1.0 - share) * late + share * early])
-        speeds = np.vstack([first, (1.0 - share) * late_m_s + share * early_m_s])
+        left, left_m_s = leg.nodes()
+        before, speeds = np.vstack([length, left]), np.vstack([first, left_m_s])
         return (switches[1:] - before).T.ravel(), speeds.T.ravel()
 
     @property
@@ -206,26 +204,35 @@ class _Leg:
     base: Floats
     slow: Floats
 
-    def early(self) -> tuple[Floats, Floats]:
-        """Nodes (M, N), metres before the end and speeds, if it flies at its top speed until the limit falls."""
-        down = np.linspace(self.top, self.slow, LAW_NODES + 1)
-        return self._nodes(self.top, down, self.top)
+    def nodes(self) -> tuple[Floats, Floats]:
+        """Nodes (M, N), metres before the end and speeds: the end of speeding up, of flying level, of easing into
+        braking; then braking along the limit.
 
-    def late(self) -> tuple[Floats, Floats]:
-        """The same if it still speeds up where the limit is below its speed, so that it brakes late and hard."""
-        law, peak = self.law, self._peak()
+        If it still speeds up where the limit is below its speed, it brakes late and hard; if not, it flies at its top
+        speed until the limit falls. Between the two it reaches each speed at a place between theirs.
+        """
+        law, peak, share = self.law, self._peak(), self._early_share()
         begins = np.maximum(np.minimum(law.distance_m(peak, self.base) - law.ease_m(peak), self._after_m(peak)), 0.0)
         fell = np.clip(peak - law.ease_m_s, self.slow, peak)
+        hard_m = begins - law.ease_m(peak) - fell**2 / (2.0 * law.accel)  # where it would stand
         low, high = self.slow, fell
         for _ in range(_ROUNDS):  # where it meets the limit
             middle = 0.5 * (low + high)
-            here = begins - law.ease_m(peak) - (fell**2 - middle**2) / (2.0 * law.accel)
-            over = here < law.before_m(middle, self.corner, self.base)
+            over = hard_m + middle**2 / (2.0 * law.accel) < law.before_m(middle, self.corner, self.base)
             low, high = np.where(over, low, middle), np.where(over, middle, high)
-        return self._nodes(peak, np.linspace(low, self.slow, LAW_NODES + 1), fell, begins)
+        down = np.vstack([peak, fell, np.linspace(low, self.slow, LAW_NODES + 1)])
+        down = (1.0 - share) * down + share * np.vstack(
+            [self.top, self.top, np.linspace(self.top, self.slow, LAW_NODES + 1)]
+        )
+        eased = law.ease_m(peak) * np.clip((peak**2 - down**2) / np.maximum(peak**2 - fell**2, _LEAST_M), 0.0, 1.0)
+        limit = law.before_m(down, self.corner, self.base)
+        late = np.minimum(np.where(down > fell, begins - eased, hard_m + down**2 / (2.0 * law.accel)), limit)
+        whole = [self.left + self.cut, self._after_m(peak), *((1.0 - share) * late + share * limit), self.cut]
+        before = np.clip(np.array(whole) - self.cut, 0.0, self.left)
+        return np.minimum.accumulate(before, axis=0), np.array([self.first, peak, *down, self.slow])
 
-    def early_share(self) -> Floats:
-        """(N,) from 0, it flies as in `late`, to 1, as in `early`."""
+    def _early_share(self) -> Floats:
+        """(N,) from 0, it brakes late, to 1, it flies at its top speed until the limit falls."""
         law = self.law
         latest = law.distance_m(self.top, self.base) - law.ease_m(self.top)
         room = law.before_m(self.top, self.corner, self.base) - latest
@@ -244,15 +251,6 @@ class _Leg:
             over = np.maximum(law.distance_m(middle, self.base) - law.ease_m(middle), 0.0) > self._after_m(middle)
             low, high = np.where(over, low, middle), np.where(over, middle, high)
         return high
-
-    def _nodes(self, peak: Floats, down: Floats, fell: Floats, begins: Floats | None = None) -> tuple[Floats, Floats]:
-        """The end of speeding up, of flying level, of easing into braking; then braking along the limit."""
-        limit = self.law.before_m(down, self.corner, self.base)
-        level = limit[0] if begins is None else begins
-        eased = level if begins is None else begins - self.law.ease_m(peak)
-        whole = [self.left + self.cut, self._after_m(peak), level, eased, *limit, self.cut]
-        before = np.clip(np.array(whole) - self.cut, 0.0, self.left)
-        return np.minimum.accumulate(before, axis=0), np.array([self.first, peak, peak, fell, *down, self.slow])
 
 
 def smoothed(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -11,11 +12,12 @@ import pytest
 
 from gcsplan.arrays import Floats
 from gcsplan.fleet.motion.px4 import Smoothed, smoothed
-from gcsplan.fleet.motion.timing import at_own_speed
+from gcsplan.fleet.motion.timing import at_own_speed, legs
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.geometry.limits import Limits
 from tests.oracles.px4_smoothing import fly
 from tests.support.effort import seeds
+from tests.support.worlds import vehicle
 
 RADIUS_M = 3.0
 
@@ -102,3 +104,13 @@ def test_whatever_is_flown_the_motion_is_whole_and_faster_is_never_later(seed: i
     assert (run <= 8.001 * np.diff(np.append(0.0, at)) + 1e-6).all()
     slower = at_own_speed(way, 3.0)
     assert slower.time_s(12.0) == slower.time_s(1.0) == way.time_s(3.0)
+
+
+@pytest.mark.parametrize(("length_m", "accel_m_s2", "jerk_m_s3"), [(118.086, 3.0, 4.0), (15.1, 4.47, 2.6)])
+def test_a_faster_leg_is_never_later_where_its_speed_is_hardly_reached(
+    length_m: float, accel_m_s2: float, jerk_m_s3: float
+) -> None:
+    craft = replace(vehicle(Autopilot.PX4), accel_m_s2=accel_m_s2, leg_jerk_m_s3=jerk_m_s3)
+    leg, owner = np.array([[0.0, 0.0, 0.0], [length_m, 0.0, 0.0]]), np.zeros(1, dtype=np.intp)
+    ways = [legs(leg, craft, owner, pace=np.array([m_s])) for m_s in np.linspace(2.0, 18.0, 81)]
+    assert (np.diff([way.time_s(1.0) for way in ways if way is not None]) <= 1e-6).all()
