@@ -116,6 +116,21 @@ def wind_changes(text: str | None) -> list[MissionChange]:
     return [] if text is None else [MissionChange(f"--wind {text}", "wind", "wind", _wind(text.strip()))]
 
 
+def one_wind(text: str | None) -> tuple[float, float] | None:
+    """The speed in m/s, and the direction that it comes from, of ``M_S,FROM_DEG``; None without a text.
+
+    Raises UsageError for any other text.
+    """
+    if text is None:
+        return None
+    from gcsplan.mission_file.values.schema import MOST_DECLARED_M_S
+
+    match = re.fullmatch(rf"\s*({_FIGURES})\s*,\s*({_FIGURES})\s*", text)
+    if match is None or float(match[1]) > MOST_DECLARED_M_S or float(match[2]) > 360.0:
+        raise UsageError(f"--wind {text}: give M_S,FROM_DEG (5,270), at most {MOST_DECLARED_M_S:g} m/s and 360°")
+    return float(match[1]), float(match[2])
+
+
 def _wind(text: str) -> dict[str, Any]:
     """The section ``wind:`` of a mission."""
     if text == "still":

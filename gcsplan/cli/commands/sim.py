@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from gcsplan.cli.arguments import completion
+from gcsplan.cli.arguments.changes import one_wind
 from gcsplan.cli.arguments.options import AutopilotOption, FirmwareOption, ListenOption, MisbehaveOption, SimSysidOption
 from gcsplan.errors import UsageError
 
@@ -24,6 +25,12 @@ def sim(
     firmware: FirmwareOption = None,
     sysid: SimSysidOption = None,
     misbehave: MisbehaveOption = "",
+    wind: Annotated[
+        str | None,
+        typer.Option(
+            "--wind", metavar="M_S,FROM_DEG", help="The wind that each vehicle tells as its estimate (5,270)."
+        ),
+    ] = None,
 ) -> None:
     """Simulate a loopback vehicle (or one per vehicle of a mission) that takes missions like a real one.
 
@@ -38,7 +45,7 @@ def sim(
     from gcsplan.sim.vehicle.server import SimServer, serve
     from gcsplan.vehicle import Autopilot
 
-    trouble = Misbehaviour.parse(misbehave)
+    trouble, blows = Misbehaviour.parse(misbehave), one_wind(wind)
     if mission is not None and (autopilot is not None or sysid is not None):
         raise UsageError("--autopilot and --sysid go without a mission file: its vehicles have their own")
     if mission is not None:
@@ -73,6 +80,9 @@ def sim(
         )
         for (number, kind, place, amsl_m, own), version in zip(stands, versions, strict=True)
     ]
+
+    for vehicle in vehicles:
+        vehicle.wind = blows
 
     def ready(server: SimServer) -> None:
         names = ", ".join(f"system {v.sysid} ({v.autopilot} {v.firmware.name})" for v in vehicles)

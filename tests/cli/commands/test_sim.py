@@ -27,11 +27,11 @@ def served(monkeypatch: pytest.MonkeyPatch) -> list[tuple[LoopbackVehicle, str]]
 
 
 def test_without_a_mission_there_is_one_copter_in_a_valley_of_the_sample(run: Any, served: list[Any]) -> None:
-    code, out, err = run("sim", "--listen", "udpin:127.0.0.1:0", "--misbehave", "refuse=3")
+    code, out, err = run("sim", "--listen", "udpin:127.0.0.1:0", "--misbehave", "refuse=3", "--wind", "5.5,270")
     assert (code, out) == (0, "")
     [(vehicle, url)] = served
     assert (vehicle.sysid, vehicle.autopilot, url) == (1, Autopilot.ARDUCOPTER, "udpin:127.0.0.1:0")
-    assert vehicle.misbehave.refuse == 3
+    assert (vehicle.misbehave.refuse, vehicle.wind) == (3, (5.5, 270.0))
     assert "simulating system 1 (arducopter" in err
     assert "connect to udpout:127.0.0.1:" in err
     assert "Ctrl-C ends it" in err
@@ -52,6 +52,8 @@ def test_each_vehicle_of_a_mission_stands_at_its_start(run: Any, served: list[An
         ((CROSSING, "--sysid", 2), "--autopilot and --sysid go without a mission file"),
         (("--autopilot", "paparazzi"), "--autopilot paparazzi: give one of arducopter, arduplane, px4"),
         (("--misbehave", "sulk=1"), "sulk"),
+        (("--wind", "up-to:5"), "--wind up-to:5: give M_S,FROM_DEG (5,270)"),
+        (("--wind", "76,0"), "at most 75 m/s and 360°"),
     ],
 )
 def test_what_does_not_go_together_is_refused(run: Any, served: list[Any], arguments: Any, words: str) -> None:
