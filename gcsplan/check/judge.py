@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -96,7 +97,8 @@ def judge(
         clock = FlightTimes(flight.stretches, vehicle, world, home, radius_m)
         seconds = clock.seconds()
         if wind is not None and (not wind.declared.still or wind.late_s) and _judged_in_wind(flight, vehicle, wind):
-            blown = FlightInWind(flight.stretches, clock, vehicle, wind, _agl_m(plane, report, len(flight.stretches)))
+            agl_m, agl_of = _agl_m(plane, report, len(flight.stretches)), partial(_agl_along_m, world, vehicle.limits)
+            blown = FlightInWind(flight.stretches, clock, vehicle, wind, agl_m, agl_of)
     windy = blown is not None and blown.too_windy is None and not blown.wind.still
     costs = blown.costs_so_far if blown is not None and windy else None
     figures = _figures(flight, plane, report, vehicle, world, seconds, costs)
@@ -152,6 +154,12 @@ def _agl_m(plane: PlaneLegs, report: LegReport, count: int) -> Floats:
     np.minimum.at(found[:, 0], plane.owner, report.min_agl_m)
     np.maximum.at(found[:, 1], plane.owner, report.max_agl_m)
     return found
+
+
+def _agl_along_m(world: World, limits: Limits, start: Floats, end: Floats) -> Floats:
+    """(P, 2) the lowest and highest height above ground of straight ways; NaN where none of its ground is known."""
+    report = world.airspace.examine(Legs.between(start, end, limits), limits)
+    return np.column_stack([report.min_agl_m, report.max_agl_m])
 
 
 def _blown_away(blown: FlightInWind | None) -> list[Finding]:

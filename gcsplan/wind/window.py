@@ -41,14 +41,20 @@ class TimeWindow:
 
 
 class FlightClock(Protocol):
-    """The times of a flight at N points, for speeds over ground (P,) of its parts."""
+    """The times of a flight at N points, for speeds over ground (P,) of its parts.
+
+    Where the wind depends on the height, several parts are pieces of one leg, which is flown at one largest speed.
+    """
 
     @property
     def run_m(self) -> Floats:
         """(P,) the parts' lengths over ground."""
 
+    def even_m_s(self, slow_m_s: Floats, fast_m_s: Floats) -> tuple[Floats, Floats]:
+        """(..., P) the lowest and the highest speed of all pieces of each part's leg."""
+
     def between(self, slow_m_s: Floats, fast_m_s: Floats) -> TimeWindow:
-        """The window where each part is flown at most at a speed between two."""
+        """The window where each part is flown at most at a speed between two; these are even."""
 
     def summed(self, seconds: Floats) -> Floats:
         """(..., N) the sums of seconds of parts (..., P) up to each point, with all rounds."""
@@ -69,30 +75,38 @@ def cover(wind: DeclaredWind) -> Floats:
 
 def window(winds: WindsAlong, clock: FlightClock) -> TimeWindow:
     """The window at each point that ``clock`` tells of, by the speeds that ``winds`` allow."""
-    if winds.wind.single or winds.wind.varying:
-        slow, fast = winds.speeds_m_s(cover(winds.wind))
-        return clock.between(np.fmax(slow, ADVANCES_M_S).min(axis=0), fast.max(axis=0))
-    return _searched(winds, clock)
+    if not (winds.wind.single or winds.wind.varying):
+        return _searched(winds, clock)
+    slow, fast = winds.speeds_m_s(cover(winds.wind))
+    slow, fast = np.fmax(slow, ADVANCES_M_S).min(axis=0), fast.max(axis=0)
+    return _nearer(clock, slow, fast, clock.summed(clock.run_m / fast), clock.summed(clock.run_m / slow))
+
+
+def _nearer(clock: FlightClock, slow: Floats, fast: Floats, early: Floats, late: Floats) -> TimeWindow:
+    """The bounds of the times with the parts' speeds (P,) between two, and with the sums of their lengths over speeds
+    (N,) between two.
+
+    They lie between the times at the legs' highest and lowest speeds. Nearer: what a flight takes beyond that sum
+    hardly falls where speeds rise.
+    """
+    low, high = clock.even_m_s(slow, fast)
+    rough, loose_s = clock.between(low, high), clock.loose_s(low, high)
+    earliest_s = rough.latest_s - clock.summed(clock.run_m / low) + early - loose_s
+    latest_s = rough.earliest_s - clock.summed(clock.run_m / high) + late + loose_s
+    return TimeWindow(
+        np.maximum(rough.earliest_s, np.minimum(earliest_s, rough.latest_s)),
+        np.minimum(rough.latest_s, np.maximum(latest_s, rough.earliest_s)),
+    )  # fmt: skip
 
 
 def _within(winds: WindsAlong, clock: FlightClock, cells: Floats) -> list[TimeWindow]:
     """The bounds of the times with one wind of each cell during the whole flight.
 
-    They lie between the times at the parts' highest and lowest speeds. Nearer: the sum of lengths over speeds is
-    convex in the wind, so no more than at a corner, and no less than its tangent; what a flight takes beyond that sum
-    hardly falls where speeds rise.
+    The sum of lengths over speeds is convex in the wind, so no more than at a corner, and no less than its tangent.
     """
-    found = winds.bounds(cells)
-    corner, fast, early, late = _sums(found, winds, clock)
-    slow, early, late = corner.min(axis=1), early.min(axis=1), late.max(axis=1)
-    at_fast, at_slow = clock.summed(clock.run_m / fast), clock.summed(clock.run_m / slow)
-    windows = []
-    for k in range(len(cells)):
-        rough, loose_s = clock.between(slow[k], fast[k]), clock.loose_s(slow[k], fast[k])
-        earliest_s = rough.latest_s - at_slow[k] + early[k] - loose_s
-        latest_s = rough.earliest_s - at_fast[k] + late[k] + loose_s
-        windows.append(TimeWindow(np.maximum(rough.earliest_s, earliest_s), np.minimum(rough.latest_s, latest_s)))
-    return windows
+    corner, fast, early, late = _sums(winds.bounds(cells), winds, clock)
+    rows = zip(corner.min(axis=1), fast, early.min(axis=1), late.max(axis=1), strict=True)
+    return [_nearer(clock, *row) for row in rows]
 
 
 def _sums(found: SpeedBounds, winds: WindsAlong, clock: FlightClock) -> tuple[Floats, Floats, Floats, Floats]:
@@ -126,16 +140,16 @@ def witnessed(winds: WindsAlong, clock: FlightClock, still_m_s: Floats) -> Witne
     if winds.wind.single or winds.wind.varying:
         slow, fast = winds.speeds_m_s(cover(winds.wind))
         slow, fast = np.fmax(slow, ADVANCES_M_S).min(axis=0), fast.max(axis=0)
-        at = clock.between(slow, fast)
-        return _alike(at, slow, fast, still_m_s)
+        return _alike(clock.between(*clock.even_m_s(slow, fast)), slow, fast, still_m_s)
     found = winds.bounds(witnesses(winds.wind))
     corner, fast, early, late = _sums(found, winds, clock)
     slow = corner.min(axis=1)
     if (slow == fast[0]).all() and (fast == fast[0]).all():
-        return _alike(clock.between(slow[0], fast[0]), slow.min(axis=0), fast.max(axis=0), still_m_s)
+        at = clock.between(*clock.even_m_s(slow[0], fast[0]))
+        return _alike(at, slow.min(axis=0), fast.max(axis=0), still_m_s)
     # The motion is computed for neighbouring cells together: it is what takes the time.
     for some in np.array_split(np.arange(len(fast)), min(CELL_GROUPS, len(fast))):
-        low, high = slow[some].min(axis=0), fast[some].max(axis=0)
+        low, high = clock.even_m_s(slow[some].min(axis=0), fast[some].max(axis=0))
         rough, loose_s = clock.between(low, high), clock.loose_s(low, high)
         at_low, at_high = clock.summed(clock.run_m / low), clock.summed(clock.run_m / high)
         early[some] += rough.latest_s - at_low - loose_s
@@ -183,8 +197,7 @@ def _searched(winds: WindsAlong, clock: FlightClock) -> TimeWindow:
     earliest_s, latest_s = np.array(np.inf), np.array(-np.inf)
     while True:
         kept += list(zip(cells, _within(winds, clock, cells), strict=True))
-        for speeds in zip(*winds.speeds_m_s(np.repeat(_likely(cells)[:, :, None], 2, axis=2)), strict=True):
-            at = clock.between(*speeds)
+        for at in _within(winds, clock, np.repeat(_likely(cells)[:, :, None], 2, axis=2)):
             earliest_s, latest_s = np.fmin(earliest_s, at.earliest_s), np.fmax(latest_s, at.latest_s)
         looked += len(cells)
         excess = np.array([_excess(bound, earliest_s, latest_s) for _, bound in kept])

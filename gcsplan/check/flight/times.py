@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from gcsplan.arrays import Floats, Indices
+from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.check.motion.project import ends_of
 from gcsplan.check.motion.stretch import Stretch
 from gcsplan.fleet.motion.timing import legs, upright
@@ -102,6 +102,14 @@ class FlightTimes:
             if way is not None:
                 seconds[run.first : run.last] = way.shares_s(1.0, run.last - run.first)
         return seconds
+
+    @property
+    def turns(self) -> Bools:
+        """(N,) whether a stretch ends without a stop."""
+        found = np.zeros(len(self._columns_s), dtype=np.bool_)
+        for run in self._runs:
+            found[run.first : run.last - 1] = True
+        return found
 
     @property
     def parts(self) -> Parts:

@@ -14,7 +14,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from gcsplan.arrays import Bools, Floats
+from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.check.flight.times import FlightTimes, Parts
 from gcsplan.check.motion.stretch import Stretch
 from gcsplan.figures import floored
@@ -28,9 +28,13 @@ from gcsplan.world.geodesy.atmosphere import true_per_indicated
 
 __all__ = ["Costs", "FlightInWind", "TooWindy", "WaysHome", "air_m_s", "gust_length_m"]
 
-UNEVEN_S, SHORT_M, EVEN_S = 0.35, 200.0, 0.02
-"""Legs of ArduPilot and PX4 that are shorter than `SHORT_M` may take this much longer at a higher speed, others
-`EVEN_S`: the most of 20,000 random flights was 0.33 s. Slower legs of the other models are never earlier."""
+UNEVEN_S = 0.1
+"""Before each turn of an ArduPilot or a PX4, a flight may be later by this at a higher speed: the most of 46,000 random
+flights was 0.07 s. Slower legs of the other models are never earlier."""
+
+STIFF_S, STIFF_M, STIFF_PER_S = 0.35, 200.0, 2.0
+"""A PX4 whose acceleration, m/s², is more than its jerk, m/s³, times the last of these is less regular: each of its
+legs that is shorter than the second may be later by the first."""
 
 COUPLED, COUPLED_SMOOTH = 2.0, 4.0
 """Seconds by which speeding up and braking may be shorter where a part is 1 m/s faster, times the acceleration, m/s²;
@@ -43,6 +47,8 @@ distance by which turbulence displaces an aircraft."""
 LOW_FT, HIGH_FT, FOOT_M = 10.0, 1000.0, 0.3048
 STRETCHES_BESIDE = 2
 """Stretches before and after one at whose speeds it may be flown, while the aircraft speeds up and brakes."""
+PIECE_M, MOST_PIECES = 5.0, 24
+"""A leg through a wind that depends on the height is cut into pieces that rise by at most this, at most so many."""
 _TRIED_STEPS = 12
 _TIMED_CELLS = 16
 _NO_RUN_M = 1e-6
@@ -103,17 +109,22 @@ def gust_length_m(agl_m: float) -> float:
 class FlightInWind:
     """A flight's N stretches in the winds of a set; ``agl_m`` (N, 2): lowest and highest height above ground of each.
 
+    ``agl_of``: the same (P, 2) of straight ways from ``start`` (P, 3) to ``end``; None: of a way, that of its stretch.
     NaN where the ground is not known.
     """
 
     def __init__(
-        self, stretches: Sequence[Stretch], times: FlightTimes, vehicle: Vehicle, wind: FlightWind, agl_m: Floats
-    ) -> None:
+        self, stretches: Sequence[Stretch], times: FlightTimes, vehicle: Vehicle, wind: FlightWind, agl_m: Floats,
+        agl_of: Callable[[Floats, Floats], Floats] | None = None,
+    ) -> None:  # fmt: skip
         self.stretches, self.times, self.vehicle, self.flies_in = stretches, times, vehicle, wind
         self.wind, self._departs_s = wind.declared, wind.departs_s
-        self._agl_m = np.where(np.isnan(agl_m), [0.0, math.inf], agl_m)
-        self._parts = times.parts
-        self._ability, self._run_m = _ability(vehicle, self._parts)
+        self._parts, self._cuts = _pieces(times.parts, wind.declared)
+        self._ability, self._run_m = _ability(vehicle, times.parts, self._cuts)
+        self._agl_m, parts = _known(agl_m), self._parts
+        self._piece_agl_m = self._agl_m[parts.stretch]
+        if agl_of is not None and self.wind.heights == "agl" and (self._cuts > 1).any():
+            self._piece_agl_m = _known(agl_of(parts.start, parts.end))
         self._still_s = times.seconds()
 
     @cached_property
@@ -248,7 +259,7 @@ class FlightInWind:
         hours_s = self._timed[1] if len(self.wind.times_s) > 1 else self._any_hour
         along, cells = self._along(self.wind, hours_s), cover(self.wind)
         air, slows = along.costs(cells)[0], along.speeds_m_s(cells)[0]
-        slow = slows.min(axis=0)
+        slow, _ = self.even_m_s(slows.min(axis=0), slows.max(axis=0))
         moving_s = self._moving_s(slow)
         late_s, _ = self._gust_s(along, self.between(slow, slow).latest_s)
         later_s = np.diff(late_s, prepend=0.0) / self._rounds
@@ -266,13 +277,13 @@ class FlightInWind:
         blown_m += self._gust_air_m(moving_s)
         if self.vehicle.energy.base_w and len(cells) > 1:  # else times cost nothing
             groups = np.array_split(slows, _TIMED_CELLS)
-            moving_s = most(np.array([self._moving_s(group.min(axis=0)) for group in groups]))
+            moving_s = most(np.array([self._moving_s(self.even_m_s(g.min(axis=0), g[0])[0]) for g in groups]))
         return Costs(air_m + blown_m + later_s * fastest, moving_s + later_s, self._held_s[1], wind_m_s)
 
     def _moving_s(self, slow_m_s: Floats) -> Floats:
         """(N,) the most seconds of each stretch, if no part is flown slower than this, and none earlier than in still
         air."""
-        return np.maximum(self.times.seconds(slow_m_s) + (not self.wind.single) * self._uneven_s, self._still_s)
+        return np.maximum(self._seconds(slow_m_s) + (not self.wind.single) * self._uneven_s, self._still_s)
 
     @cached_property
     def _held_s(self) -> tuple[Floats, Floats]:
@@ -307,14 +318,26 @@ class FlightInWind:
         speeds up and brakes."""
         per_m_s = (COUPLED_SMOOTH if self.vehicle.smooths else COUPLED) / self.vehicle.accel_m_s2
         least_s, most_s = self._held_s
-        joints_s = self.summed((fast_m_s - slow_m_s) * per_m_s)
+        joints_s = self.summed((fast_m_s - slow_m_s) * per_m_s / np.repeat(self._cuts, self._cuts))
         joints_s = np.append(joints_s[1:], joints_s[-1:])  # the joint to the next stretch
         return joints_s + np.cumsum((most_s - least_s + 2.0 * self._uneven_s) * self._rounds)
 
+    def even_m_s(self, slow_m_s: Floats, fast_m_s: Floats) -> tuple[Floats, Floats]:
+        """(..., P) the lowest and the highest speed of all pieces of each part's leg."""
+        if (self._cuts == 1).all():
+            return slow_m_s, fast_m_s
+        first = np.cumsum(self._cuts) - self._cuts
+        low, high = np.minimum.reduceat(slow_m_s, first, axis=-1), np.maximum.reduceat(fast_m_s, first, axis=-1)
+        return np.repeat(low, self._cuts, axis=-1), np.repeat(high, self._cuts, axis=-1)
+
+    def _seconds(self, even_m_s: Floats) -> Floats:
+        """(N,) seconds of the stretches, with all pieces of a leg at most at one speed."""
+        return self.times.seconds(even_m_s[np.cumsum(self._cuts) - 1])
+
     def between(self, slow_m_s: Floats, fast_m_s: Floats) -> TimeWindow:
-        """The window where each part is flown at most at a speed between two."""
+        """The window where each part is flown at most at a speed between two; these are even."""
         least_s, most_s = self._held_s
-        latest = earliest = self.times.seconds(slow_m_s)
+        latest = earliest = self._seconds(slow_m_s)
         differ = np.zeros(len(self.stretches), dtype=np.bool_)
         np.logical_or.at(differ, self._parts.stretch, slow_m_s != fast_m_s)
         if differ.any():
@@ -322,7 +345,7 @@ class FlightInWind:
             uneven_s = np.where(
                 differ | np.append(differ[1:], False) | np.append(False, differ[:-1]), self._uneven_s, 0.0
             )
-            latest, earliest = latest + uneven_s, np.maximum(self.times.seconds(fast_m_s) - uneven_s, 0.0)
+            latest, earliest = latest + uneven_s, np.maximum(self._seconds(fast_m_s) - uneven_s, 0.0)
         return TimeWindow(np.cumsum((earliest + least_s) * self._rounds), np.cumsum((latest + most_s) * self._rounds))
 
     @cached_property
@@ -336,13 +359,16 @@ class FlightInWind:
         uneven = np.zeros(count)
         if self.vehicle.keeps_airspeed or not (self.vehicle.lays_curves or self.vehicle.smooths):
             return uneven
-        run_m = np.bincount(self._parts.stretch, weights=self._run_m, minlength=count)
+        turns, run_m = self.times.turns, np.bincount(self._parts.stretch, weights=self._run_m, minlength=count)
         seqs = [s.seq for s in self.stretches]
         ends = [*(i for i, (a, b) in enumerate(pairwise(seqs)) if a != b), count - 1]
+        stiff = self.vehicle.smooths and self.vehicle.accel_m_s2 > STIFF_PER_S * self.vehicle.leg_jerk_m_s3
         first = 0
         for last in ends:  # chords of one item are one leg
             length_m = float(run_m[first : last + 1].sum())
-            uneven[last] = 0.0 if length_m <= _NO_RUN_M else UNEVEN_S if length_m < SHORT_M else EVEN_S
+            uneven[last] = UNEVEN_S * turns[last]
+            if stiff and _NO_RUN_M < length_m < STIFF_M:
+                uneven[last] = STIFF_S
             first = last + 1
         return uneven
 
@@ -421,7 +447,7 @@ class FlightInWind:
         """The winds of a set along the parts, within hours (P, 2)."""
         parts = self._parts
         amsl_m = np.sort(np.column_stack([parts.start[:, 2], parts.end[:, 2]]), axis=1)
-        return _probes(wind, self._ability, amsl_m, self._agl_m[parts.stretch], hours_s)
+        return _probes(wind, self._ability, amsl_m, self._piece_agl_m, hours_s)
 
 
 class WaysHome:
@@ -508,8 +534,26 @@ def _between(span: Sequence[float], nodes: Floats) -> list[float]:
     return [low, *inside, *([high] if high > low else [])]
 
 
-def _ability(vehicle: Vehicle, parts: Parts) -> tuple[Ability, Floats]:
-    """What the vehicle can do on the parts, and their lengths over ground (P,)."""
+def _known(agl_m: Floats) -> Floats:
+    """Lowest and highest heights above ground (..., 2), any height where the ground is not known."""
+    return np.where(np.isnan(agl_m), [0.0, math.inf], agl_m)
+
+
+def _pieces(parts: Parts, wind: DeclaredWind) -> tuple[Parts, Indices]:
+    """Parts cut so that a wind that depends on the height has its own on each piece; how many each gives (P,)."""
+    rise_m = np.abs(parts.end[:, 2] - parts.start[:, 2])
+    cuts = np.clip(np.ceil(rise_m / PIECE_M), 1, MOST_PIECES).astype(np.intp)
+    if len(wind.heights_m) == 1:
+        cuts = np.ones_like(cuts)
+    number = np.repeat(np.arange(len(cuts)), cuts)
+    before = np.arange(len(number)) - np.repeat(np.cumsum(cuts) - cuts, cuts)
+    way = parts.end - parts.start
+    start, end = (parts.start[number] + (k / cuts[number])[:, None] * way[number] for k in (before, before + 1.0))
+    return Parts(start, end, parts.stretch[number], parts.speed_m_s[number]), cuts
+
+
+def _ability(vehicle: Vehicle, parts: Parts, cuts: Indices) -> tuple[Ability, Floats]:
+    """What the vehicle can do on the pieces of the parts, and their lengths over ground (P,)."""
     d = parts.end - parts.start
     run = np.hypot(d[:, 0], d[:, 1])
     moves = run > _NO_RUN_M
@@ -519,4 +563,5 @@ def _ability(vehicle: Vehicle, parts: Parts) -> tuple[Ability, Floats]:
     least, most = air_m_s(vehicle, parts.speed_m_s, slope, 0.5 * (parts.start[:, 2] + parts.end[:, 2]))
     wing = vehicle.keeps_airspeed
     bound = np.full(len(run), math.inf) if wing else parts.speed_m_s
-    return Ability(course, slope if wing else np.zeros_like(slope), least, most, bound), run
+    rows = course, slope if wing else np.zeros_like(slope), least, most, bound
+    return Ability(*(np.repeat(row, cuts, axis=0) for row in rows)), np.repeat(run / cuts, cuts)

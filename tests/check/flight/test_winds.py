@@ -16,10 +16,9 @@ from gcsplan.check.battery import battery_home
 from gcsplan.check.flight.winds import (
     COUPLED,
     COUPLED_SMOOTH,
-    EVEN_S,
-    SHORT_M,
     UNEVEN_S,
     WaysHome,
+    air_m_s,
     gust_length_m,
 )
 from gcsplan.check.judge import judge
@@ -29,7 +28,7 @@ from gcsplan.vehicle import Autopilot, Energy, Vehicle
 from gcsplan.wind.declared import DeclaredWind, FlightWind
 from gcsplan.wind.window import TimeWindow
 from gcsplan.world.geodesy.atmosphere import true_per_indicated
-from tests.check.test_judge import mission_over
+from tests.check.test_judge import ideal, mission_over
 from tests.support.wings import through, wing
 from tests.support.worlds import vehicle, world
 
@@ -182,6 +181,23 @@ def test_a_profile_over_height_counts_at_the_height_that_is_flown() -> None:
     assert window_of(aloft)[1] == pytest.approx(window_of(flown(blows((6, 6), (90, 90))))[1], rel=1e-4)
 
 
+@pytest.mark.parametrize("heights", ["amsl", "agl"])
+def test_a_long_climb_through_a_profile_counts_the_wind_at_each_height(heights: str) -> None:
+    craft, ground_m = replace(ideal(), speed_max_m_s=12.0, lean_angle_deg=40.0), 300.0
+    nodes_m = np.array([360.0, 480.0]) - (0.0 if heights == "amsl" else ground_m)
+    aloft = blows(((1, 1), (8, 8)), ((90, 90), (90, 90)), heights_m=nodes_m, heights=heights)
+    verdict = flown(aloft, craft, [[0.0, 0, 360], [4000, 0, 480]])
+    (_, begins_s), (earliest_s, latest_s) = (verdict.leg_windows_s() or ())[0], window_of(verdict)
+    amsl_m = np.linspace(360.0, 480.0, 4001)
+    slope = np.full(4001, 0.03)
+    bounds = [np.minimum(air - np.interp(amsl_m, [360.0, 480.0], [1.0, 8.0]), 12.0)
+              for air in air_m_s(craft, np.full(4001, 12.0), slope, np.full(4001, 420.0))]  # fmt: skip
+    least_s, most_s = (4000.0 * float((1.0 / g).mean()) for g in reversed(bounds))
+    assert earliest_s - begins_s <= least_s * 1.001
+    assert latest_s - begins_s >= most_s * 0.999
+    assert latest_s - earliest_s <= 0.07 * most_s  # the lean is known within half of this
+
+
 @pytest.mark.slow
 def test_a_forecast_counts_in_the_hours_of_the_flight() -> None:
     hours = {"times_s": np.array([0.0, 3600.0, 7200.0])}
@@ -244,7 +260,7 @@ def test_slower_legs_are_never_done_earlier_but_for_what_is_uneven(kind: str, co
         np.cumsum(legs(points, craft, np.arange(count), ground_m_s=speeds).shares_s(1.0, count))
         for speeds in (fast, slow)
     )  # fmt: skip
-    uneven_s = np.zeros(count) if kind in ("rounded", "sharp") else np.where(run_m < SHORT_M, UNEVEN_S, EVEN_S)
+    uneven_s = np.append(np.full(count - 1, 0.0 if kind in ("rounded", "sharp") else UNEVEN_S), 0.0)
     assert (early - late <= np.cumsum(uneven_s) + 1e-6).all()
     beyond = (late - np.cumsum(run_m / slow)) - (early - np.cumsum(run_m / fast))
     joints = np.cumsum((fast - slow) * (COUPLED_SMOOTH if kind == "smoothed" else COUPLED) / craft.accel_m_s2)
