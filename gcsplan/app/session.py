@@ -17,12 +17,14 @@ import threading
 import time
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from gcsplan.app.fleet import pipeline
 from gcsplan.app.fleet.kept_paths import KeptPaths
+from gcsplan.app.parallel.sites import world_of
 from gcsplan.app.plan.arguments import require
 from gcsplan.app.plan.model import Plan, PlanOptions, VehiclePlan
 from gcsplan.arrays import Floats
@@ -37,7 +39,7 @@ from gcsplan.errors import (
     wrong_argument,
 )
 from gcsplan.mission_file import load_mission
-from gcsplan.mission_file.kept import KeptWorld
+from gcsplan.mission_file.kept import KeptWorld, Latest, is_kept
 from gcsplan.mission_file.load import load_content
 from gcsplan.mission_file.request import Content, MissionFile
 from gcsplan.mission_file.source import read_content
@@ -50,6 +52,9 @@ __all__ = ["BetterPath", "Planner"]
 MissionSource = MissionFile | str | os.PathLike[str] | Mapping[str, Any]
 
 ZONE_LISTS = ("no_fly", "keep_in")
+
+AT_PLACE_M = 0.05
+"""A way point of a path that lies so near to an end or a via is at that place, m."""
 
 _STEP = re.compile(r"\.?([^.\[\]]+)|\[(\d+)\]")
 """A step of a key's place: a name, or the number of an element."""
@@ -130,6 +135,8 @@ class Planner:
         # Lines of a text would be those before its changes.
         self._content: Content = replace(source.content, text=None)
         self._kept, self._paths = KeptWorld(), KeptPaths()
+        self._worlds: Latest[World] = Latest(1)
+        self._tracks: dict[str, Floats] = {}  # the last path of each vehicle: (N, 3) lat, lon, AMSL of its way points
         self._planning, self._state = threading.RLock(), threading.Lock()
         self._cancels = 0
 
@@ -178,6 +185,7 @@ class Planner:
         on_bound: BoundCall | None = None,
         leave_out: bool | None = None,
         alone: str | None = None,
+        draft: bool = False,
     ) -> Plan:
         """Plan the mission as it is now; ``changes`` count for this plan alone.
 
@@ -187,9 +195,13 @@ class Planner:
         ``alone`` names a vehicle: the mission is planned as if the others were not in it. This is quick while only that
         vehicle changes, and says nothing of the others.
 
+        ``draft``: the last path of each vehicle in this session is tried first, drawn through the places as they are
+        now. If it is legal, it is the first path, some times sooner than a search finds one; so a plan need not have
+        the bytes that the command line writes. For somebody who drags a point: plan without it when he lets go.
+
         Returns what `gcsplan.plan` returns. Raises InputError, NoMission, and Cancelled after `cancel`.
         """
-        return self._planned(self._cancels, changes, on_path, on_bound, leave_out, alone)
+        return self._planned(self._cancels, changes, on_path, on_bound, leave_out, alone, draft)
 
     def _planned(
         self,
@@ -199,18 +211,28 @@ class Planner:
         on_bound: BoundCall | None,
         leave_out: bool | None,
         alone: str | None = None,
+        draft: bool = False,
     ) -> Plan:
         """See `plan`; a cancel after the first ``cancels`` ends it."""
-        require("plan", on_path=on_path, on_bound=on_bound, leave_out=leave_out)
+        require("plan", on_path=on_path, on_bound=on_bound, leave_out=leave_out, alone=alone, draft=draft)
         begun_s = time.perf_counter()
         content = self._content if changes is None else _changed(self._content, changes)
         with cancelled_by(lambda: self._cancels != cancels), self._planning:
             heed_cancel()
-            source = load_content(content if alone is None else _alone(content, alone), self._kept)
-            heard = _Listening(source, on_path, on_bound, begun_s) if on_path or on_bound else None
-            lasting = changes is None and alone is None  # what counts for this plan alone leaves no trace
-            kept = self._paths if lasting else KeptPaths()
-            return pipeline.plan_again(source, replace(self._options, leave_out=leave_out), kept, heard)
+            source = load_content(content if alone is None else _alone(content, alone), self._kept, stay=draft)
+            listened = on_path or on_bound or draft
+            heard = _Listening(source, on_path, on_bound, begun_s, self._tracks) if listened else None
+            # What counts for this plan alone leaves no trace in plans that are no drafts.
+            kept = self._paths if changes is None and alone is None and not draft else KeptPaths()
+            known = heard.known_tracks() if heard and draft else {}
+            options = replace(self._options, leave_out=leave_out)
+            return pipeline.plan_again(source, self._world(source), options, kept, heard, known)
+
+    def _world(self, source: MissionFile) -> World:
+        """The world of a mission; the last one if ground and zones are the same."""
+        frame, scale = source.frame, source.airspace_scale
+        made_of = (source.surface, source.zones, scale, frame.lat_deg, frame.lon_deg, frame.amsl_m)
+        return self._worlds.get(made_of, partial(world_of, source), keeps=lambda w: is_kept(w.airspace.surface))
 
     async def plan_async(
         self,
@@ -242,18 +264,33 @@ class Planner:
     def reload(self) -> None:
         """Forget what is kept of files, so that the next plan reads them as they are then."""
         with self._planning:
-            self._kept, self._paths = KeptWorld(), KeptPaths()
+            self._kept, self._paths, self._worlds = KeptWorld(), KeptPaths(), Latest(1)
+            self._tracks.clear()
 
 
 class _Listening:
     """Turns a plan's progress into calls for better paths and bounds. A search that begins anew with larger margins
-    has paths of its own, which count from the first again."""
+    has paths of its own, which count from the first again. ``tracks``: where the last path of each vehicle is kept."""
 
     def __init__(
-        self, source: MissionFile, on_path: PathCall | None, on_bound: BoundCall | None, begun_s: float
-    ) -> None:
+        self, source: MissionFile, on_path: PathCall | None, on_bound: BoundCall | None, begun_s: float,
+        tracks: dict[str, Floats],
+    ) -> None:  # fmt: skip
         self._frame, self._on_path, self._on_bound, self._begun_s = source.frame, on_path, on_bound, begun_s
+        self._tracks = tracks
+        self._ends = {
+            v.vehicle.name: np.array([v.start[:2], *(p[:2] for p in v.via), v.goal[:2]]) for v in source.vehicles
+        }
+        for name in tracks.keys() - self._ends.keys():
+            del tracks[name]
         self._known: dict[str, tuple[float, float, float]] = {}  # by vehicle: cost, bound, seconds of its search
+
+    def known_tracks(self) -> dict[str, Floats]:
+        """(N, 3) east_m, north_m, amsl_m of the way points of each vehicle's last path, without its ends and vias."""
+        return {
+            name: np.column_stack([self._frame.to_plane(track[:, 0], track[:, 1]), track[:, 2]])
+            for name, track in self._tracks.items()
+        }
 
     def __call__(self, vehicle: str, state: Progress) -> None:
         cost, bound, until_s = self._known.get(vehicle, (np.inf, 0.0, 0.0))
@@ -262,12 +299,16 @@ class _Listening:
         if state.lower_bound is not None and state.lower_bound > bound and self._on_bound is not None:
             bound = state.lower_bound
             self._on_bound(vehicle, bound)
-        if state.path is not None and state.cost is not None and state.cost < cost and self._on_path is not None:
+        if state.path is not None and state.cost is not None and state.cost < cost:
             cost = state.cost
             points = state.path.points
-            lat, lon = self._frame.to_degrees(points[:, 0], points[:, 1]).T
-            elapsed_s = time.perf_counter() - self._begun_s
-            self._on_path(BetterPath(vehicle, lat, lon, points[:, 2].copy(), cost, state.lower_bound, elapsed_s))
+            degrees = self._frame.to_degrees(points[:, 0], points[:, 1])
+            away_m = np.linalg.norm(points[:, None, :2] - self._ends[vehicle], axis=-1).min(axis=1)
+            self._tracks[vehicle] = np.column_stack([degrees, points[:, 2]])[away_m > AT_PLACE_M]
+            if self._on_path is not None:
+                lat, lon = degrees.T
+                elapsed_s = time.perf_counter() - self._begun_s
+                self._on_path(BetterPath(vehicle, lat, lon, points[:, 2].copy(), cost, state.lower_bound, elapsed_s))
         self._known[vehicle] = cost, bound, state.elapsed_s
 
 

@@ -40,6 +40,7 @@ from gcsplan.mission_file.request import (
 from gcsplan.mission_file.scene import (
     MissionPlace,
     covered,
+    lie_within,
     make_box,
     make_frame,
     make_place,
@@ -204,10 +205,11 @@ def _places(around: Any) -> tuple[tuple[float, float], ...]:
     raise wrong_argument("load_mission()", "around", around, expected)
 
 
-def load_content(content: Content, kept: KeptWorld | None = None) -> MissionFile:
+def load_content(content: Content, kept: KeptWorld | None = None, *, stay: bool = False) -> MissionFile:
     """Read a mission again from what it was read from before. ``kept``: what the reading before kept, and this one
-    keeps. Raises InputError."""
-    return _MissionReading(content, kept or KeptWorld()).mission()
+    keeps. ``stay``: use the plane and the window of terrain of the reading before, as long as the mission's places lie
+    well within them; nothing of the terrain is then read or fitted anew. Raises InputError."""
+    return _MissionReading(content, kept or KeptWorld(), stay=stay).mission()
 
 
 def _reaching(content: Content, places: Sequence[tuple[float, float]]) -> MissionFile:
@@ -230,8 +232,8 @@ def zones_by_entry(content: Content, kept: KeptWorld) -> dict[str, Sequence[Zone
 class _MissionReading:
     """One pass over one file: the steps in order, and the problems found so far."""
 
-    def __init__(self, content: Content, kept: KeptWorld) -> None:
-        self.content, self.file, self.text = content, content.file, content.text
+    def __init__(self, content: Content, kept: KeptWorld, *, stay: bool = False) -> None:
+        self.content, self.file, self.text, self.stay = content, content.file, content.text, stay
         self.kept = kept
         kept.begin()
         self.where = f"{content.where}: "
@@ -274,6 +276,11 @@ class _MissionReading:
         frame: Frame | None = None
         if places and (frame_keys is not None or not self.local):
             frame = make_frame(places, frame_keys, problems, self.where)
+        stays = self.kept.plane if self.stay and frame is not None else None
+        if stays is not None and frame is not None and lie_within(places, *stays, like=frame, local=self.local):
+            frame = stays[0]
+        else:
+            stays = None
         departure = self.content.departure or (None if hours is None else hours.start)
         wind = self._wind(hours, frame, places)
         if wind is not None:
@@ -282,11 +289,14 @@ class _MissionReading:
         site: MissionPlane | None = None
         ground: GroundWindow | None = None
         if frame is not None and terrain is not None:
-            placed, far = place_zones(drafts, frame)
+            plane = frame.lat_deg, frame.lon_deg
+            placed, far = self.kept.placed.get((drafts, plane), partial(place_zones, drafts, frame))
             self._far(far, frame)
             self.notes += zone_notes(placed)
             others = known_in_plane(self.content.around, terrain, frame)
-            box = make_box([*(p.in_plane(frame) for p in places), *others], [z for _, z in placed], local=self.local)
+            points = [*(p.in_plane(frame) for p in places), *others]
+            box = stays[1] if stays else make_box(points, [z for _, z in placed], local=self.local)
+            self.kept.plane = frame, box
             here = self._around(terrain, frame, box)
             if here is not None:
                 problems += faults_near(placed, box)

@@ -214,6 +214,17 @@ def make_box(points: Sequence[tuple[float, float]], zones: Sequence[Zone], *, lo
     return float(grown[0]), float(grown[1]), float(grown[2]), float(grown[3])
 
 
+def lie_within(places: Sequence[MissionPlace], frame: Frame, box: Box, *, like: Frame, local: bool) -> bool:
+    """Whether all places lie within ``box`` of a plane, with the least room for detours around them. ``like``: the
+    plane that is the mission's own; if the mission is ``local``, there is no other."""
+    if frame.amsl_m != like.amsl_m or (local and (frame.lat_deg, frame.lon_deg) != (like.lat_deg, like.lon_deg)):
+        return False
+    p = np.array([place.in_plane(frame) for place in places])
+    least = LOCAL_MARGIN_M if local else MARGIN_M
+    low, high = p.min(axis=0) - least, p.max(axis=0) + least
+    return bool((low >= box[:2]).all() and (high <= box[2:]).all())
+
+
 def make_zones(
     keys: ZoneKeys, where: str, folder: Path, fallback: str, problems: list[Mistake], notes: list[Note], *, local: bool,
     hours: Hours | None = None, keep_in: bool = False, held: Mapping[str, bytes] = NO_FILES,

@@ -137,7 +137,9 @@ class MissionPlane:
         except InputError as why:
             problems += why.problems
             return None
-        zones = [*settle_zones(self.placed, surface, problems), *outside]
+        settle = partial(settle_zones, self.placed, surface, problems)
+        settled = self.kept.settled.get((self.placed, surface), settle, keeps=lambda _: not problems)
+        zones = [*settled, *outside]
         requests = [make_request(s, self.frame, surface, zones, self.good, problems) for s in self.terminals]
         return GroundWindow(surface, tuple(zones), scale, tuple(r for r in requests if r is not None))
 

@@ -359,7 +359,7 @@ class MapSession:
             if self._held is not None or (self._superseded and not live):
                 return  # a message waits behind the drag, or what is owed comes after it
             changes = dict(edits.live) if live else None
-            plan = planner.plan(changes, on_path=on_path, on_bound=on_bound, alone=alone)
+            plan = planner.plan(changes, on_path=on_path, on_bound=on_bound, alone=alone, draft=live)
             self._planning_live = None
             if live:
                 for v in plan.vehicles:  # of a planner that tells no progress

@@ -89,6 +89,9 @@ class Problem:
     twice as far as here) if memory allows; None if it does not, or if there is no more terrain; `Surface.goes_on` shows
     which. ``leaving``: if a bound above this cost is found, the search ends, because paths that leave the surface may
     cost as little: more terrain is needed first.
+
+    ``known`` (N, 3): east_m, north_m, amsl_m of the way points, without ends and vias, of a path that was legal before
+    places or zones moved. A planner may try it first.
     """
 
     airspace: Airspace
@@ -114,6 +117,7 @@ class Problem:
     leaving: float = math.inf
     checked: Limits | None = None
     rounding_m: tuple[float, float] = (0.0, 0.0)
+    known: Floats | None = None
 
     def __repr__(self) -> str:
         return f"<Problem from {self.start} to {self.goal}, {len(self.via)} vias, {len(self.airspace.zones)} zones>"

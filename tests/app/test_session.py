@@ -157,6 +157,42 @@ def test_each_path_is_better_than_the_one_before_and_each_bound_holds() -> None:
     assert np.hypot(paths[0].lat_deg[0] - start[0], paths[0].lon_deg[0] - start[1]) < 1e-4
 
 
+class Enough(Exception):
+    """A first path is there."""
+
+
+def first_path(session: Planner, goal: dict[str, float], *, draft: bool) -> BetterPath:
+    found: list[BetterPath] = []
+
+    def on_path(better: BetterPath) -> None:
+        found.append(better)
+        raise Enough
+
+    with pytest.raises(Enough):
+        session.plan({"vehicles.uav1.goal": goal}, on_path=on_path, draft=draft)
+    return found[0]
+
+
+def test_a_draft_bends_the_last_path_and_leaves_no_trace_in_a_plan() -> None:
+    session, other = Planner(LEGS), Planner(LEGS)
+    before = first_path(session, {"east_m": 905, "north_m": 0}, draft=False)
+    bent = first_path(session, {"east_m": 915, "north_m": 4}, draft=True)
+    assert len(bent.lat_deg) == len(before.lat_deg) > 2
+    assert abs(bent.lat_deg[1] - before.lat_deg[1]) < 1e-7  # around the mast as before
+    assert (bent.lat_deg[-1], bent.lon_deg[-1]) != (before.lat_deg[-1], before.lon_deg[-1])
+    assert session.plan(draft=True).vehicles[0].verdict.safe is True
+    for goal in ({"east_m": 915, "north_m": 4}, {"east_m": -300, "north_m": 900}):
+        changes = {"vehicles.uav1.goal": goal}
+        assert figures(session.plan(changes)) == figures(other.plan(changes))
+
+
+def test_a_draft_far_from_the_last_window_reads_ground_there() -> None:
+    session = Planner(LEGS)
+    session.plan(draft=True)
+    planned = session.plan({"vehicles.uav1.goal": {"east_m": 9000, "north_m": 7000}}, draft=True)
+    assert planned.vehicles[0].verdict.safe is True
+
+
 @pytest.mark.nightly
 def test_what_a_callback_raises_ends_the_plan_and_not_the_session() -> None:
     session = Planner(LEGS)

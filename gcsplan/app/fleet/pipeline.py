@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from datetime import datetime
 from os import PathLike
 from typing import Any
@@ -21,6 +22,7 @@ from gcsplan.app.parallel.sites import world_of
 from gcsplan.app.plan.arguments import require
 from gcsplan.app.plan.left_out import LeavingOut
 from gcsplan.app.plan.model import Brief, Plan, PlanOptions, VehiclePlan
+from gcsplan.arrays import Floats
 from gcsplan.errors import InputError, NoMission, elements, unknown_name, wrong_argument
 from gcsplan.mission_file import MissionFile, load_mission
 from gcsplan.mission_file.values.schema import MOST_SEED
@@ -28,6 +30,7 @@ from gcsplan.planners.problem import UNIT_OF, Problem, Progress, Solution
 from gcsplan.planners.registry import VOLUME_KEYS, AddedEntry
 from gcsplan.planners.registry import get as get_planner
 from gcsplan.planners.registry import own as own_planner
+from gcsplan.world.world import World
 
 __all__ = ["load_mission", "plan", "plan_again", "world_of"]
 
@@ -96,7 +99,7 @@ def plan(  # noqa: PLR0913 - options by name, each with a default
         words = "the mission is read already, with its forecast from another departure on: give `departure` to "
         raise InputError(f"{words}load_mission", where="gate_utc")
     keys = dict(elements("plan()", "options", (options or {}).items(), tuple, "a mapping of a planner's keys"))
-    brief = _brief_of(source, PlanOptions(planner, objective, seed, keys))
+    brief = _brief_of(source, PlanOptions(planner, objective, seed, keys), world_of(source))
     leaving = _leaving(source, leave_out)
     vehicles = _planned(brief, progress, jobs, cluster, leaving)
     return finished(brief, vehicles, progress, leaving, None if gate_utc is None else GateTime(gate_utc))
@@ -104,12 +107,15 @@ def plan(  # noqa: PLR0913 - options by name, each with a default
 
 def plan_again(
     source: MissionFile,
+    world: World,
     given: PlanOptions,
     kept: KeptPaths,
     progress: Callable[[str, Progress], None] | None = None,
+    known: Mapping[str, Floats] | None = None,
 ) -> Plan:
-    """`plan` for a session, which searches no path anew where only the arrival differs from what is ``kept``."""
-    brief, leaving = _brief_of(source, given), _leaving(source, given.leave_out)
+    """`plan` for a session, which searches no path anew where only the arrival differs from what is ``kept``, and tries
+    the ``known`` tracks of vehicles first (`Problem.known`)."""
+    brief, leaving = replace(_brief_of(source, given, world), known=known or {}), _leaving(source, given.leave_out)
     vehicles = kept.get(brief, leaving)
     if vehicles is None:
         vehicles = _planned(brief, progress, 1, None, leaving)
@@ -123,7 +129,7 @@ def _leaving(source: MissionFile, leave_out: bool | None) -> LeavingOut:
     return LeavingOut(allowed=leave_out)
 
 
-def _brief_of(source: MissionFile, given: PlanOptions) -> Brief:
+def _brief_of(source: MissionFile, given: PlanOptions, world: World) -> Brief:
     """The terms on which all vehicles of a mission are planned; the ``given`` options override the file's keys."""
     own = given.planner if callable(given.planner) else None
     entry = get_planner(given.planner or source.planner.name) if own is None else own_planner(own)  # type: ignore[arg-type]
@@ -138,7 +144,7 @@ def _brief_of(source: MissionFile, given: PlanOptions) -> Brief:
     if not 0 <= number <= MOST_SEED:
         raise wrong_argument("plan()", "seed", number, f"a whole number from 0 to {MOST_SEED}")
     return Brief(
-        source, world_of(source), name, goal, number, merged, len(source.vehicles) > 1 and entry.by_priority(merged),
+        source, world, name, goal, number, merged, len(source.vehicles) > 1 and entry.by_priority(merged),
         own,
     )  # fmt: skip
 

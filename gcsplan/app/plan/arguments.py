@@ -14,7 +14,7 @@ __all__ = ["require"]
 
 FLAGS = (
     "leave_out", "report", "way_home", "atomic", "offline", "allow_unjudged", "allow_armed", "allow_parameters",
-    "ignore_position",
+    "ignore_position", "draft",
 )  # fmt: skip
 NUMBER_ARGUMENTS = ("wind_m_s", "gusts_m_s", "noise_m", "from_deg", "tolerance_m", "radius_km", "flat_m", "min_agl_m")
 
@@ -33,6 +33,7 @@ EXPECTED: dict[str, tuple[Any, str]] = {
     "file": (PATH_KINDS, "the path of a file"),
     "what": (PATH_KINDS, "a plan, a mission, or the path of a .waypoints or .plan file"),
     "vehicle": (str, "the name of a vehicle"),
+    "alone": (str, "the name of a vehicle"),
     "wind": (Mapping, "a mapping of the keys of a mission's `wind`, such as {'up_to_m_s': 8}"),
     "mirror": (str, "the URL of a mirror"),
     "vertical_datum": (str, "the name of a vertical datum, such as 'EGM96'"),

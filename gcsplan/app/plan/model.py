@@ -10,6 +10,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, cast
 
 from gcsplan.app.plan.left_out import LeftOut
+from gcsplan.arrays import Floats
 from gcsplan.check.verdict import Verdict
 from gcsplan.errors import GcsplanError
 from gcsplan.fleet.arrival import Slot
@@ -59,7 +60,7 @@ class Brief:
     """How all vehicles of a mission file are planned: by which planner, with ``options`` that only it knows.
 
     ``by_priority``: each vehicle is planned with knowledge of those before it, and gives way to them. ``own``: the
-    planner, if it is a script's function.
+    planner, if it is a script's function. ``known``: `Problem.known` by the vehicles' names.
     """
 
     source: MissionFile
@@ -70,6 +71,7 @@ class Brief:
     options: Mapping[str, object]
     by_priority: bool = False
     own: Callable[[Problem], Solution] | None = None
+    known: Mapping[str, Floats] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         return f"<Brief: {self.planner}, {self.objective}, seed {self.seed}>"

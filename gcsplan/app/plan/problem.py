@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from gcsplan.app.plan.model import Brief
+from gcsplan.arrays import Floats
 from gcsplan.check.judge import judge
 from gcsplan.check.motion.project import why_unknown
 from gcsplan.check.verdict import Verdict
@@ -156,6 +157,7 @@ def make_problem(
     margins: Margins = MARGINS,
     progress: Callable[[Progress], None] | None = None,
     options: Mapping[str, object] | None = None,
+    known: Floats | None = None,
 ) -> tuple[Problem, tuple[Note, ...]]:
     """The planner's problem for one vehicle, and notes for the user.
 
@@ -212,6 +214,7 @@ def make_problem(
         progress=progress,
         options=dict(settings.extras if options is None else options),
         widen=None if source.wider is None else wider,
+        known=known,
     )
     if vehicle.autopilot is Autopilot.ARDUPLANE and vehicle.turn_radius_m <= 0.0:
         notes.append(Note("flown_as_quadplane"))

@@ -57,9 +57,12 @@ def plan_vehicle(
         attempts = wing_attempts(brief, request, limited, world)
     else:
         attempts = _copter_attempts(brief, request, limited, world)
+    known = brief.known.get(vehicle.name)
     return replanned(
         attempts,
-        lambda margins: make_problem(source, limited, world, brief.objective, brief.seed, margins, progress, merged),
+        lambda margins: make_problem(
+            source, limited, world, brief.objective, brief.seed, margins, progress, merged, known
+        ),
     )
 
 
