@@ -144,6 +144,8 @@ def require_kind(where: str, name: str, value: object, kind: Any, expected: str)
     try:
         if fits and isinstance(value, Real):
             float(value)
+        if fits and isinstance(value, PATH_KINDS):
+            str(value)  # as a path is made of it
         if fits and kind == PATH_KINDS:
             fits = b"\0" not in os.fsencode(value)  # type: ignore[arg-type]
     except Exception:  # OverflowError, UnicodeEncodeError, and whatever a stranger's path raises

@@ -84,6 +84,13 @@ class NoPath:
         raise RuntimeError("no path")
 
 
+class NoString(str):
+    """A text that cannot be written."""
+
+    def __str__(self) -> str:
+        raise RuntimeError("no string")
+
+
 class NoShape:
     """GeoJSON that is none, or raises."""
 
@@ -120,7 +127,7 @@ VALUES: list[Any] = [
     datetime.timedelta(1), np.zeros(0), np.full((3, 3), np.nan), np.array([None, object()], object),
     np.datetime64("NaT", "s"), np.ma.masked, collections.UserDict(a=1), Path("absent"),
     NoText(), NoList([1]), NoMapping(),
-    NoAttributes(), AllAttributes(), NoPath(), NoShape(None), NoShape(7), NoArray(),
+    NoAttributes(), AllAttributes(), NoPath(), NoString("x"), NoShape(None), NoShape(7), NoArray(),
 ]  # fmt: skip
 
 ZONED = {**FLAT, "no_fly": [FEATURE | {"properties": {"name": "pond"}}]}

@@ -26,8 +26,13 @@ FLEET = (
 )
 
 
+WALLED = FLAT.replace("{min_agl_m: 30}", "{min_agl_m: 30, max_agl_m: 60}").replace(
+    "no_fly:\n", "no_fly:\n  - {name: lid, center: [46.51, 8.51], radius_m: 200, floor_agl_m: 5}\n"
+)
+
+
 def start(hand: Hand) -> None:
-    hand.until("document.querySelector('#start') || document.querySelector('dialog, form')")
+    hand.until("document.querySelector('#start')")
 
 
 def edit(hand: Hand) -> None:
@@ -35,10 +40,7 @@ def edit(hand: Hand) -> None:
 
 
 def infeasible(hand: Hand) -> None:
-    hand.judged()
-    hand.page.evaluate("document.querySelector('#limit-list').open = true")
-    hand.write("#field-limits-max_agl_m", "1")
-    hand.until("!document.querySelector('#verdict strong')?.textContent.endsWith('safe')")
+    hand.until("document.querySelector('#verdict.unsafe')")
 
 
 def forms(hand: Hand) -> None:
@@ -49,13 +51,13 @@ def forms(hand: Hand) -> None:
 
 def upload(hand: Hand) -> None:
     hand.judged()
-    hand.until("!document.querySelector('#upload').disabled")
-    hand.click("#upload")
-    hand.until("document.querySelector('dialog[open]')")
+    hand.until("document.querySelector('#fly-upload') && !document.querySelector('#fly-upload').disabled")
+    hand.page.evaluate("document.querySelector('#fly-sim').click(); document.querySelector('#fly-upload').click()")
+    hand.until("document.querySelector('#upload-send')")
 
 
 VIEWS: dict[str, tuple[str | None, Callable[[Hand], None]]] = {
-    "start": (None, start), "edit": (FLAT, edit), "infeasible": (FLAT, infeasible), "fleet": (FLEET, edit),
+    "start": (None, start), "edit": (FLAT, edit), "infeasible": (WALLED, infeasible), "fleet": (FLEET, edit),
     "forms": (FLAT, forms), "upload": (FLAT, upload),
 }  # fmt: skip
 
