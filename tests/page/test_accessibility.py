@@ -21,7 +21,7 @@ pytestmark = [pytest.mark.nightly, *IN_A_BROWSER]
 FLEET = (
     FLAT
     + """\
-  - {name: uav2, sysid: 2, autopilot: arducopter, start: [36.601, -84.301], goal: [36.611, -84.291]}
+  - {name: uav2, sysid: 2, autopilot: arducopter, start: [46.501, 8.498], goal: [46.511, 8.506]}
 """
 )
 

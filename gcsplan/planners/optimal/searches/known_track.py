@@ -39,8 +39,8 @@ class KnownTrack(Search):
 def through_places(problem: Problem, known: Floats) -> tuple[Floats, Bools]:
     """The path (M, 3) from start to goal over the way points ``known`` (N, 3), and (M,) which points must stay.
 
-    Each via is put in where it lies nearest to the track, after the via before it; if it has no altitude, at that of
-    the path there.
+    Each via is put in where it lies nearest to the track, after the via before it; a via without an altitude gets the
+    altitude of the path there.
     """
     way, rest, goal = [np.array(problem.start)], list(known), np.array(problem.goal)
     stay = [True]
