@@ -29,7 +29,7 @@ MOST_CELLS_KEPT = 6_000_000
 """Most cells of a surface that is kept: some 50 MB for each of its heights."""
 
 T = TypeVar("T")
-Placed = tuple[Sequence[tuple[ZoneDraft, Zone]], Sequence[ZoneDraft]]
+Placed = tuple[list[tuple[ZoneDraft, Zone]], list[ZoneDraft]]
 """The zones of a mission in its plane, and the ones that lie too far away for it."""
 
 ReadZones = tuple[Sequence[ZoneDraft], Sequence[Note], Sequence[Mistake]]

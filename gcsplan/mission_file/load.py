@@ -40,13 +40,13 @@ from gcsplan.mission_file.request import (
 from gcsplan.mission_file.scene import (
     MissionPlace,
     covered,
-    lie_within,
     make_box,
     make_frame,
     make_place,
     make_spec,
     make_zones,
     place_notes,
+    plane_again,
 )  # fmt: skip
 from gcsplan.mission_file.source import read_content
 from gcsplan.mission_file.terminals import Terminals
@@ -276,11 +276,8 @@ class _MissionReading:
         frame: Frame | None = None
         if places and (frame_keys is not None or not self.local):
             frame = make_frame(places, frame_keys, problems, self.where)
-        stays = self.kept.plane if self.stay and frame is not None else None
-        if stays is not None and frame is not None and lie_within(places, *stays, like=frame, local=self.local):
-            frame = stays[0]
-        else:
-            stays = None
+        stays = plane_again(self.kept.plane, places, frame, local=self.local) if self.stay else None
+        frame = stays[0] if stays else frame
         departure = self.content.departure or (None if hours is None else hours.start)
         wind = self._wind(hours, frame, places)
         if wind is not None:

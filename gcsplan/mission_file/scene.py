@@ -214,15 +214,20 @@ def make_box(points: Sequence[tuple[float, float]], zones: Sequence[Zone], *, lo
     return float(grown[0]), float(grown[1]), float(grown[2]), float(grown[3])
 
 
-def lie_within(places: Sequence[MissionPlace], frame: Frame, box: Box, *, like: Frame, local: bool) -> bool:
-    """Whether all places lie within ``box`` of a plane, with the least room for detours around them. ``like``: the
-    plane that is the mission's own; if the mission is ``local``, there is no other."""
-    if frame.amsl_m != like.amsl_m or (local and (frame.lat_deg, frame.lon_deg) != (like.lat_deg, like.lon_deg)):
-        return False
+def plane_again(
+    plane: tuple[Frame, Box] | None, places: Sequence[MissionPlace], own: Frame | None, *, local: bool
+) -> tuple[Frame, Box] | None:
+    """``plane``, a plane and a window in it, if all places lie within the window with the least room for detours; else
+    None. ``own`` is the mission's own plane; a ``local`` mission has no other."""
+    if plane is None or own is None:
+        return None
+    frame, box = plane
+    if frame.amsl_m != own.amsl_m or (local and (frame.lat_deg, frame.lon_deg) != (own.lat_deg, own.lon_deg)):
+        return None
     p = np.array([place.in_plane(frame) for place in places])
     least = LOCAL_MARGIN_M if local else MARGIN_M
     low, high = p.min(axis=0) - least, p.max(axis=0) + least
-    return bool((low >= box[:2]).all() and (high <= box[2:]).all())
+    return plane if (low >= box[:2]).all() and (high <= box[2:]).all() else None
 
 
 def make_zones(
