@@ -128,7 +128,7 @@ def _first_paths(
     }  # fmt: skip
 
 
-class _Enough(Exception):
+class _FirstPath(Exception):
     """A draft has its path."""
 
 
@@ -138,14 +138,14 @@ def _draft_paths(
     """Seconds of the processor to the first path of drafts, which end with it."""
 
     def enough(_: BetterPath) -> None:
-        raise _Enough
+        raise _FirstPath
 
     took = []
     for _ in range(changes + 1):
         begun_s = time.thread_time()
         try:
             session.plan({"vehicles.uav1.goal": drawn_goal(middle, rng)}, on_path=enough, draft=True)
-        except _Enough:
+        except _FirstPath:
             took.append(time.thread_time() - begun_s)
         except GcsplanError:
             continue
