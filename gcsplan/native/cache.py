@@ -1,4 +1,4 @@
-"""Stores the intermediate form of kernels beside their source, and machine code in a cache on disk.
+"""Stores the intermediate form of kernels beside their source, and machine code in a private cache on disk.
 
 Machine code is run as it is found: whoever can write to the cache can run anything as the user of this process. So it
 is taken only from a regular file that belongs to that user and that nobody else can write to, in a folder (0700) for
@@ -63,7 +63,7 @@ def write_shipped(path: Path, digest: str, made_with: dict[str, str], bitcode: b
 
 
 def read_kept(name: str) -> bytes | None:
-    """Machine code of that name from the cache, if it is there, is whole, and nobody else could have put it there."""
+    """The bytes of that name from the cache, if they are there, whole, and nobody else could have put them there."""
     try:
         folder = _cache()
         if folder is None or not _is_private(folder):
@@ -78,7 +78,10 @@ def read_kept(name: str) -> bytes | None:
 
 
 def keep(name: str, code: bytes) -> bool:
-    """Write machine code to the cache; return False if there is no cache of ours alone. Older code is dropped."""
+    """Write bytes to the cache, which nobody else can read; return False if there is none of ours alone.
+
+    Older ones of their kind are dropped.
+    """
     try:
         folder = _cache()
         if folder is None:
@@ -162,7 +165,7 @@ def _replace(path: Path, content: bytes, *, mode: int) -> None:
 
 
 def _forget_others(folder: Path, name: str) -> None:
-    """Drop all but the newest codes of the same kernels (each change of source or machine adds one) and old parts."""
+    """Drop all but the newest codes of the same kind (each change of source or machine adds one) and old parts."""
     kind = name.split("-")[0]
 
     def age(path: Path) -> float:
@@ -179,5 +182,5 @@ def _forget_others(folder: Path, name: str) -> None:
 
 
 def name_of_code(kind: str, key: str) -> str:
-    """The file name of some kernels' machine code for a machine."""
+    """The file name of what is kept of a kind under a key, such as some kernels' machine code for a machine."""
     return f"{kind}-{key[:32]}{_SUFFIX_OF_CODE}"

@@ -3,14 +3,27 @@
 A page of another site can send requests to 127.0.0.1, and by a name that it lets point there (DNS rebinding) it can
 read the answers, unless the Host header is checked. Browsers send the Origin of the page that opens a WebSocket, and
 nothing else keeps a foreign page from opening one.
+
+A new start for the same mission has the port and the token of the last one, so that an open page goes on. While no
+server runs, another user's program may take the port. So a page that lost its server sends the token to nobody before
+the answer to a random text (`proof_of`) shows that the other end knows it, and a token counts at its own port alone: where the
+port is taken, or a day has passed, the address is a new one.
 """
 
 from __future__ import annotations
 
+import hashlib
+import hmac
+import json
+import re
 import secrets
 import time
 from collections.abc import Awaitable, Callable, Iterable, MutableMapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
 from typing import Any
+
+from gcsplan.native import cache
 
 AsgiScope = MutableMapping[str, Any]
 AsgiReceive = Callable[[], Awaitable[MutableMapping[str, Any]]]
@@ -18,6 +31,13 @@ AsgiSend = Callable[[MutableMapping[str, Any]], Awaitable[None]]
 AsgiApp = Callable[[AsgiScope, AsgiReceive, AsgiSend], Awaitable[None]]
 
 TOKEN_BYTES = 24
+KEPT_S = 86_400.0
+"""Seconds for which the address of a mission is kept, counted from the last start or end of its server."""
+
+PROOF = "proof/"
+"""Before a random text: the one path without a token."""
+
+_TOKEN = re.compile(r"[A-Za-z0-9_-]{32}")
 
 REFUSALS = {403: b"forbidden\n", 404: b"not found\n", 405: b"method not allowed\n", 429: b"too many requests\n"}
 
@@ -29,6 +49,46 @@ GOOD_SITES = (b"same-origin", b"none")
 
 REQUESTS_PER_S, BURST = 400.0, 800.0
 """Requests that are answered each second on average, and at once; the map asks for tiles by the dozen."""
+
+
+@dataclass(frozen=True, slots=True)
+class PageAddress:
+    """Port and token of a page; ``at_s``: when they were last in use, seconds of the clock.
+
+    They are kept per mission in the user's private cache: a file (0600) in a folder (0700) that nobody else reads.
+    """
+
+    port: int
+    token: str
+    at_s: float = field(default_factory=time.time)
+
+    @classmethod
+    def kept(cls, place: Path) -> PageAddress | None:
+        """The address of the mission at ``place`` of an earlier run; None if there is none, or only an old one."""
+        try:
+            found = cls(**json.loads(cache.read_kept(_kept_as(place)) or b"{}"))
+            good = _TOKEN.fullmatch(found.token) and 0 < found.port < 2**16 and abs(time.time() - found.at_s) < KEPT_S
+        except (ValueError, TypeError):
+            return None
+        return found if good else None
+
+    def keep(self, place: Path) -> None:
+        """Keep it for the next run of the mission at ``place``; without a private cache the next address is new."""
+        cache.keep(_kept_as(place), json.dumps(asdict(self)).encode())
+
+
+def _kept_as(place: Path) -> str:
+    return cache.name_of_code("map", hashlib.sha256(str(place.absolute()).encode("utf-8", "replace")).hexdigest())
+
+
+def new_token() -> str:
+    """A token that nobody guesses."""
+    return secrets.token_urlsafe(TOKEN_BYTES)
+
+
+def proof_of(token: str, text: str) -> str:
+    """What only a server that knows the token can answer to a random text; it tells nothing of the token."""
+    return hmac.new(token.encode(), f"gcsplan map {text}".encode(), "sha256").hexdigest()
 
 
 class Rate:
@@ -52,11 +112,11 @@ class Rate:
 class Guard:
     """An ASGI application in front of ``app``, which sees paths without the token.
 
-    ``port`` is the server's; ``map_host`` the origin of a base map that the user gave, or empty.
+    ``port`` is the server's; ``map_host`` the origin of a base map that the user gave, or empty; ``token`` a kept one.
     """
 
-    def __init__(self, app: AsgiApp, port: int, map_host: str = "") -> None:
-        self.token = secrets.token_urlsafe(TOKEN_BYTES)
+    def __init__(self, app: AsgiApp, port: int, map_host: str = "", token: str = "") -> None:
+        self.token = token or new_token()
         self._app = app
         self._host = f"127.0.0.1:{port}".encode()
         self._origin = b"http://" + self._host
@@ -70,7 +130,11 @@ class Guard:
             return
         status = self._refusal(scope)
         if status:
-            await _refuse(scope, receive, send, status, self._headers)
+            given = scope["path"].removeprefix(f"/{PROOF}")
+            if status == 404 and scope["type"] == "http" and scope["method"] == "GET" and _TOKEN.fullmatch(given):
+                await _answer(send, 200, proof_of(self.token, given).encode(), self._headers)
+            else:
+                await _refuse(scope, receive, send, status, self._headers)
             return
         _, _, rest = scope["path"].removeprefix("/").partition("/")
         inner = {**scope, "path": f"/{rest}", "raw_path": f"/{rest}".encode()}
@@ -115,7 +179,10 @@ async def _refuse(
         await receive()
         await send({"type": "websocket.close", "code": 1008})  # before it is accepted: 403
         return
-    words = REFUSALS[status]
+    await _answer(send, status, REFUSALS[status], headers)
+
+
+async def _answer(send: AsgiSend, status: int, words: bytes, headers: Iterable[tuple[bytes, bytes]]) -> None:
     start = [(b"content-type", b"text/plain; charset=utf-8"), (b"content-length", str(len(words)).encode())]
     await send({"type": "http.response.start", "status": status, "headers": [*start, *headers]})
     await send({"type": "http.response.body", "body": words})

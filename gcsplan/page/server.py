@@ -11,13 +11,14 @@ import json
 import socket
 import threading
 from collections.abc import Mapping
+from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from gcsplan.errors import InputError, UsageError
 from gcsplan.page.base_map import BaseMap
-from gcsplan.page.guard import AsgiApp, Guard, Rate
+from gcsplan.page.guard import AsgiApp, Guard, PageAddress, Rate, new_token
 from gcsplan.page.map_session import MapSession, PageMessage
 from gcsplan.page.refused import PageError, not_installed
 
@@ -72,15 +73,17 @@ LOOKED_UP: ForClient = {"cache-control": "no-cache"}
 class MapServer:
     """Serves the page of ``session`` at a free port, or at ``port``; `url` is its address. Raises UsageError.
 
-    Runs in a thread of its own, from `start` to `stop`.
+    ``kept``: the address of an earlier run, which it has again if the port is free and no other one is given. Runs in a thread of its own, from `start` to `stop`.
     """
 
-    def __init__(self, session: MapSession, *, port: int = 0, base: BaseMap | None = None) -> None:
+    def __init__(
+        self, session: MapSession, *, port: int = 0, base: BaseMap | None = None, kept: PageAddress | None = None
+    ) -> None:
         self._session, self._base = session, base
         self._files = files_served()
-        self._socket = _bound(port)
+        self._socket, token = _bound_again(port, kept)
         self.port = int(self._socket.getsockname()[1])
-        self._guard = Guard(self._app(), self.port, "" if base is None else base.host)
+        self._guard = Guard(self._app(), self.port, "" if base is None else base.host, token)
         self._server = uvicorn.Server(
             uvicorn.Config(
                 self._guard, log_config=None, access_log=False, server_header=False, date_header=False, lifespan="off",
@@ -96,6 +99,16 @@ class MapServer:
     def url(self) -> str:
         """The address of the page, with its token."""
         return f"http://{HOST}:{self.port}/{self._guard.token}/"
+
+    @property
+    def address(self) -> PageAddress:
+        """What an open page needs to find the next server of this mission."""
+        return PageAddress(self.port, self._guard.token)
+
+    @property
+    def has_page(self) -> bool:
+        """Whether a page is open."""
+        return self._page is not None
 
     def start(self) -> None:
         """Serve from now on."""
@@ -293,6 +306,14 @@ def files_served() -> dict[str, Path]:
     if missing:
         raise InputError(f"the map lacks {missing[0]}: install gcsplan[map] again", where="gcsplan map")
     return files
+
+
+def _bound_again(port: int, kept: PageAddress | None) -> tuple[socket.socket, str]:
+    """A socket and a token: the kept ones, or a new token where that port is taken. Raises UsageError."""
+    if kept is not None and port in (0, kept.port):
+        with suppress(UsageError):
+            return _bound(kept.port), kept.token
+    return _bound(port), new_token()
 
 
 def _bound(port: int) -> socket.socket:

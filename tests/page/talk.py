@@ -14,6 +14,7 @@ from typing import Any
 from websockets.sync.client import ClientConnection, connect
 
 from gcsplan.page.edits import Edits
+from gcsplan.page.guard import PageAddress
 from gcsplan.page.map_session import MapSession
 from gcsplan.page.server import MapServer
 from gcsplan.page.steps.flight_steps import PageSteps
@@ -102,10 +103,10 @@ class Page:
 
 
 @contextmanager
-def serving(mission: Path | None, folder: Path) -> Iterator[MapServer]:
-    """A server of a mission, or of none in a folder."""
+def serving(mission: Path | None, folder: Path, kept: PageAddress | None = None) -> Iterator[MapServer]:
+    """A server of a mission, or of none in a folder; again at a kept address."""
     session = MapSession(Edits.of_folder(folder) if mission is None else Edits.of_file(mission), METRIC, PageSteps)
-    server = MapServer(session)
+    server = MapServer(session, kept=kept)
     server.start()
     try:
         yield server

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import socket
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -213,6 +214,36 @@ def test_a_change_on_disk_and_a_lost_server_are_said(page: Browser, field: Path)
         assert page.complaints() == []
     hand.until("document.querySelector('.banner')?.innerText.includes('connection')")
     assert hand.verdict() == "Not connected"
+
+
+@pytest.mark.nightly
+def test_an_open_page_goes_on_with_the_next_server_and_tells_no_other_its_token(page: Browser, field: Path) -> None:
+    with serving(field, field.parent) as server:
+        page.visit(server.url)
+        hand, address = Hand(page), server.address
+        hand.judged()
+        hand.drag([hand.at(GOAL), (hand.at(GOAL)[0] - 40, hand.at(GOAL)[1])])
+        hand.until("!document.getElementById('undo').disabled")
+        moved = value(page, "#place-0-goal")
+    hand.until("document.querySelector('.banner')?.innerText.includes('connection')")
+    with socket.create_server(("127.0.0.1", address.port)) as stranger:
+        stranger.settimeout(20.0)
+        heard = b""
+        for _ in range(3):
+            connection, _ = stranger.accept()
+            with connection:
+                heard += connection.recv(65536)
+                connection.sendall(b"HTTP/1.1 200 OK\r\nContent-Length: 2\r\nConnection: close\r\n\r\nno")
+        hand.until("document.querySelector('.banner')?.innerText.includes('Another program')")
+    assert b"GET /proof/" in heard
+    assert address.token.encode() not in heard
+    with serving(field, field.parent, address):
+        hand.until("!document.querySelector('.banner.bad')")
+        hand.judged()
+        assert value(page, "#place-0-goal") == moved  # the edits that were not saved
+        page.visit(server.url)  # a reload
+        hand.judged()
+    assert value(page, "#place-0-goal") == moved
 
 
 @pytest.mark.nightly

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from collections.abc import MutableMapping
+from pathlib import Path
 from typing import Any
 
-from gcsplan.page.guard import Guard, Rate
+import pytest
+
+from gcsplan.page.guard import KEPT_S, Guard, PageAddress, Rate, new_token, proof_of
 
 Sent = list[MutableMapping[str, Any]]
 
@@ -83,3 +87,32 @@ def test_requests_beyond_the_rate_are_too_many(monkeypatch: Any) -> None:
     monkeypatch.setattr("gcsplan.page.guard.REQUESTS_PER_S", 1e-9)
     guard = Guard(_app, 8000)
     assert [answer_of(guard, "/", HOST)[0]["status"] for _ in range(5)] == [404, 404, 404, 429, 429]
+
+
+def test_a_server_proves_its_token_without_telling_it_and_to_its_own_host_alone() -> None:
+    guard, text = Guard(_app, 8000, token="t" * 32), "r" * 32
+    start, body = answer_of(guard, f"/proof/{text}", HOST)
+    assert (start["status"], body["body"].decode()) == (200, proof_of("t" * 32, text))
+    assert body["body"] != answer_of(Guard(_app, 8000), f"/proof/{text}", HOST)[1]["body"]
+    for path in ("/proof/", "/proof/short", f"/proof/{text}/x", f"/{text}", f"/proof/{'ü' * 32}"):
+        assert answer_of(guard, path, HOST)[0]["status"] == 404, path
+    assert answer_of(guard, f"/proof/{text}", HOST, method="PUT")[0]["status"] == 404
+    for foreign in ((b"host", b"evil.example"), (b"sec-fetch-site", b"cross-site"), (b"origin", b"http://evil.example")):
+        assert answer_of(guard, f"/proof/{text}", HOST, foreign)[0]["status"] == 403
+
+
+def test_an_address_is_kept_for_its_mission_for_a_day_where_nobody_else_reads_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    place, address = tmp_path / "field.yaml", PageAddress(8123, new_token())
+    assert PageAddress.kept(place) is None
+    address.keep(place)
+    assert (PageAddress.kept(place), PageAddress.kept(tmp_path / "other.yaml")) == (address, None)
+    [file] = (tmp_path / "gcsplan").iterdir()
+    assert (file.stat().st_mode & 0o777, file.parent.stat().st_mode & 0o777) == (0o600, 0o700)
+    file.chmod(0o666)  # somebody else may have put it there
+    assert PageAddress.kept(place) is None
+    for bad in (PageAddress(8123, "short"), PageAddress(0, new_token()), PageAddress(1, new_token(), time.time() - KEPT_S)):
+        bad.keep(place)
+        assert PageAddress.kept(place) is None, bad

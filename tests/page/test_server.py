@@ -7,6 +7,7 @@ import socket
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -18,6 +19,7 @@ pytest.importorskip("websockets", reason="the extra map is not installed")
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from gcsplan.errors import UsageError
+from gcsplan.page.guard import PageAddress
 from gcsplan.page.server import MapServer
 from tests.page.talk import FLAT, Page, get, raw, serving
 
@@ -221,6 +223,22 @@ def test_connections_are_limited_and_come_back(server: MapServer) -> None:
 def test_a_port_that_is_taken_is_one_message(server: MapServer) -> None:
     with pytest.raises(UsageError, match=rf"--port {server.port} is taken"):
         MapServer(None, port=server.port)  # type: ignore[arg-type]
+
+
+def test_a_kept_address_counts_at_its_own_port_alone(server: MapServer) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    kept, servers = PageAddress(port, "t" * 32), list[MapServer]()
+    for address in (kept, PageAddress(server.port, "t" * 32), kept):
+        servers.append(MapServer(SimpleNamespace(hurry=lambda: None), kept=address))  # type: ignore[arg-type]
+        servers[-1].start()
+    first, *others = (made.address for made in servers)
+    for made in servers:
+        made.stop()
+    assert (first.port, first.token) == (port, kept.token)
+    for other in others:  # who has the port may have heard the token
+        assert other.port not in (server.port, port)
+        assert other.token != kept.token
 
 
 def put(server: MapServer, path: str, body: bytes, *, origin: str = "", length: int | None = None) -> tuple[int, str]:

@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from gcsplan.cli.arguments import completion
 from gcsplan.cli.arguments.options import UnitsChoice, UnitsOption
 from gcsplan.errors import UsageError
+
+if TYPE_CHECKING:
+    from gcsplan.page.server import MapServer
+
+COMES_BACK_S = 2.5
+"""Seconds within which an open page looks for its server again."""
 
 
 def map_(
@@ -21,7 +28,7 @@ def map_(
             help="The mission file, or sample:NAME; without one the page begins from nothing.",
         ),
     ] = None,
-    port: Annotated[int, typer.Option(metavar="N", help="Port at 127.0.0.1 [default: a free one].")] = 0,
+    port: Annotated[int, typer.Option(metavar="N", help="Port at 127.0.0.1 [default: the last one of this mission, or a free one].")] = 0,
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")] = True,
     base: Annotated[
         str | None,
@@ -41,6 +48,7 @@ def map_(
     from gcsplan.cli.output.console import remark, say
     from gcsplan.page.base_map import BaseMap
     from gcsplan.page.edits import Edits
+    from gcsplan.page.guard import PageAddress
     from gcsplan.page.map_session import MapSession
     from gcsplan.page.server import MapServer, files_served
     from gcsplan.page.steps.flight_steps import PageSteps
@@ -51,24 +59,36 @@ def map_(
     edits = Edits.of_folder(Path()) if mission is None else Edits.of_file(mission)
     session = MapSession(edits, units_of(units.value), PageSteps, None if below is None else below.as_dict())
     try:
-        server = MapServer(session, port=port, base=below)
+        kept = PageAddress.kept(edits.store.place)
+        server = MapServer(session, port=port, base=below, kept=kept)
+        server.address.keep(edits.store.place)
         server.start()
         try:
             say(f"the map is at {server.url}")
             remark("Ctrl-C ends it")
-            if browser:
+            if browser and not (kept is not None and _comes_back(server)):
                 _open(server.url)
             while server.wait(0.2):
                 pass
         finally:
             server.stop()
+            server.address.keep(edits.store.place)  # which may have got a file
     finally:
         broken_off = session.steps.close()
         if broken_off:
             remark(broken_off)
-        kept = session.close()
-        if kept is not None:
-            remark(f"note: edits that are not saved are kept in {kept}; the next gcsplan map of this mission has them")
+        unsaved = session.close()
+        if unsaved is not None:
+            remark(f"note: edits that are not saved are kept in {unsaved}; the next gcsplan map of this mission has them")
+
+
+def _comes_back(server: MapServer) -> bool:
+    """Whether a page that an earlier run left open connects again, so that no other one has to be opened."""
+    end_s = time.monotonic() + COMES_BACK_S
+    while time.monotonic() < end_s and server.wait(0.1):
+        if server.has_page:
+            return True
+    return False
 
 
 def _open(url: str) -> None:

@@ -17,7 +17,8 @@ export function startBar() {
   on('error', error);
   on('connection', (now) => {
     if (now === 'open') { banner('connection', ''); banner('taken', ''); }
-    if (now === 'lost') banner('connection', 'The connection with gcsplan is lost; the page tries again every second. Edits until now are kept. If gcsplan has ended, start it again.', [], 'bad');
+    if (now === 'lost') banner('connection', 'The connection with gcsplan is lost; the page tries again every second. Edits until now are kept. If gcsplan has ended, start it again with the same mission: this page goes on.', [], 'bad');
+    if (now === 'other') banner('connection', 'Another program, or a gcsplan with a new address, answers where gcsplan was. Start gcsplan map again, and open the address that it prints.', [], 'bad');
     if (now === 'taken') banner('taken', 'The mission is open in another tab, which counts now.', [button('Use this tab', connect)], 'bad');
   });
   on('unsent', () => banner('unsent', 'There is no connection: this change was not made.', [], 'bad', 4000));

@@ -15,7 +15,7 @@ const CURES = [
   ['No mission', 'The place that binds is marked, and each button below the verdict is a change with which a mission was planned.'],
   ['Not judged, or no way home', 'The notes below the figures say what is missing, and the limits say what each key means.'],
   ['An upload is refused', 'The dialogue says why, and what to set or to move; Look again reads the vehicle anew.'],
-  ['The connection is lost', 'Edits are kept beside the mission. Start gcsplan map again, and open the address that it prints.'],
+  ['The connection is lost', 'Edits are kept beside the mission. Start gcsplan map again with the same mission: the page goes on, or open the address that it prints.'],
 ];
 let closed = false;
 

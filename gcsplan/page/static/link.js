@@ -29,9 +29,24 @@ export function connect() {
     waiting = null;
     known.busy = false;
     if (event.code === TAKEN_OVER) { tell('connection', 'taken'); return; }
-    tell('connection', 'lost');
-    setTimeout(connect, AGAIN_MS);
+    again('lost');
   });
+}
+
+// The token goes to no other program that has taken the port meanwhile: a server first proves that it knows it.
+async function again(how) {
+  tell('connection', how);
+  const token = location.pathname.split('/')[1], text = btoa(String.fromCharCode(...crypto.getRandomValues(new Uint8Array(24)))).replace(/\+/g, '-').replace(/\//g, '_');
+  const bytes = (words) => new TextEncoder().encode(words);
+  let now = 'lost';
+  try {
+    const key = await crypto.subtle.importKey('raw', bytes(token), { name: 'HMAC', hash: 'SHA-256' }, false, ['sign']);
+    const proof = [...new Uint8Array(await crypto.subtle.sign('HMAC', key, bytes(`gcsplan map ${text}`)))].map((b) => b.toString(16).padStart(2, '0')).join('');
+    const answer = await fetch(`/proof/${text}`, { redirect: 'error', signal: AbortSignal.timeout(4 * AGAIN_MS) });
+    if (await answer.text() === proof) { connect(); return; }
+    if ([200, 404].includes(answer.status)) now = 'other';
+  } catch { /* nobody is there */ }
+  setTimeout(() => again(now), AGAIN_MS);
 }
 
 const open = () => socket !== null && socket.readyState === WebSocket.OPEN;

@@ -22,13 +22,16 @@ FLAT = (
 
 
 @pytest.mark.slow
-def test_ctrl_c_ends_the_server_and_keeps_the_edits(tmp_path: Path) -> None:
+def test_ctrl_c_ends_the_server_and_keeps_edits_and_address(tmp_path: Path) -> None:
     connect = pytest.importorskip("websockets.sync.client", reason="the extra map is not installed").connect
     (tmp_path / "m.yaml").write_text(FLAT)
     command = [sys.executable, "-m", "gcsplan", "map", "m.yaml", "--no-browser"]
-    with subprocess.Popen(
-        command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as running:  # fmt: skip
+
+    def start() -> subprocess.Popen[str]:
+        pipe = subprocess.PIPE
+        return subprocess.Popen(command, cwd=tmp_path, stdout=pipe, stderr=pipe, text=True)
+
+    with start() as running:
         assert running.stdout is not None
         url = running.stdout.readline().split()[-1]
         origin = url.split("/", 3)
@@ -42,6 +45,10 @@ def test_ctrl_c_ends_the_server_and_keeps_the_edits(tmp_path: Path) -> None:
     assert (tmp_path / "m.yaml").read_text() == FLAT
     kept = json.loads((tmp_path / ".m.yaml.edits").read_text())
     assert kept["mission"]["vehicles"][0]["goal"] == [46.52, 8.5]
+    with start() as again:
+        assert again.stdout is not None
+        assert again.stdout.readline().split()[-1] == url
+        again.send_signal(signal.SIGINT)
 
 
 @pytest.mark.parametrize("package", ["starlette.applications", "pmtiles.reader"])
