@@ -1,13 +1,15 @@
 // From the plan to files and vehicles: the link, connect, what is on board, upload, files, briefing.
 import { button, byId, el, refill } from './dom.js';
-import { known, on } from './hub.js';
+import { known, on, tell } from './hub.js';
 import { change, send } from './link.js';
 import { goTo } from './map.js';
+import { enter, leave } from './modes.js';
 import { drawOnBoard, drawVehicles } from './vehicles.js';
 import { startUpload, upload } from './upload.js';
 
-const KEPT = 'gcsplan-link';
-let box = null, ready = false, before = false, connected = '', asked = 0;
+const KEPT = 'gcsplan-link', NEAR = 15;
+const OF_A_PLAN = ['fly-board', 'fly-upload', 'fly-write', 'fly-brief'];
+let box = null, ready = false, before = false, online = false, connected = '', asked = 0;
 
 export function startFly() {
   const to = el('input', {
@@ -25,14 +27,22 @@ export function startFly() {
       act('fly-write', 'Write files', () => { asked = 0; ask('write', false); }, 'Write the files of gcsplan plan into the folder of the mission'),
       act('fly-brief', 'Briefing', () => { asked = ask('write', false); }, 'Write the files, and open the report: its first two pages are the briefing')),
     el('p', { class: 'note', id: 'fly-said', role: 'status' }), el('ul', { class: 'list', id: 'fly-live' }));
-  on('state', (state) => { box.hidden = state.stage !== 'mission'; });
+  on('state', (state) => {
+    box.hidden = false;
+    for (const id of [...OF_A_PLAN, 'fly-sim']) box.querySelector(`#${id}`).hidden = state.stage !== 'mission';
+    box.querySelector('h2').textContent = state.stage === 'mission' ? 'Fly' : 'Vehicles that are there';
+    box.querySelector('#fly-help').textContent = state.stage === 'mission' ? 'Where the vehicles are: a link for all, NAME=LINK for one, or sim.' : 'A link such as udpin:0.0.0.0:14550. Connect only listens; Start here begins the mission where a vehicle stands.';
+  });
   for (const kind of ['asked', 'dragged', 'refused']) on(kind, () => { before = ready; enable(false); });
   on('plan', () => enable(true));
   on('error', (message) => {
     if (message.code === 'bad_change') enable(before);
     if (message.where === 'to') problem(message.message);
   });
-  on('connection', (now) => { if (now !== 'open') { enable(false); drawVehicles([]); } });
+  on('connection', (now) => {
+    online = now === 'open';
+    if (online) names(); else { enable(false); drawVehicles([]); }
+  });
   on('steps', (message) => { connected = message.where; if (!connected) live([]); names(); });
   on('live', (message) => live(connected ? message.vehicles : []));
   on('on_board', onBoard);
@@ -50,14 +60,14 @@ function put(input, text) {
 
 function enable(yes) {
   ready = yes;
-  for (const id of ['fly-board', 'fly-upload', 'fly-write', 'fly-brief']) { const made = byId(id) || box.querySelector(`#${id}`); made.disabled = !yes; }
+  for (const id of OF_A_PLAN) { const made = byId(id) || box.querySelector(`#${id}`); made.disabled = !yes; }
   names();
 }
 
 function names() {
   const made = byId('fly-connect') || box.querySelector('#fly-connect');
   made.textContent = connected ? 'Disconnect' : 'Connect';
-  made.disabled = !connected && !ready;
+  made.disabled = !online;
 }
 
 function problem(words) {
@@ -114,10 +124,20 @@ function live(vehicles) {
 }
 
 function row(v) {
-  const own = known.state.vehicles.find((one) => one.name === v.name);
-  const start = own && own.editable && v.at && !v.silent
-    ? button('Start here', () => change({ [`${own.key}.start`]: v.at }), { id: `fly-start-${v.vehicle}`, title: `Set the start of ${v.name} to where it is` }) : null;
+  const own = known.state.vehicles.find((one) => one.name === v.name), id = v.vehicle < 0 ? v.name.replace(' ', '-') : v.vehicle;
+  const may = v.at && !v.silent && (known.state.stage === 'mission' ? own && own.editable : v.vehicle < 0);
   return el('li', { class: v.silent ? 'silent' : '' },
-    button(v.name, () => { if (v.at) goTo(v.at); }, { class: 'item', id: `fly-show-${v.vehicle}`, title: 'Show on the map' }), el('small', {}, v.text), start,
+    button(v.name, () => { if (v.at) goTo(v.at, known.state.stage === 'empty' ? NEAR : 0); }, { class: 'item', id: `fly-show-${id}`, title: 'Show on the map' }), el('small', {}, v.text),
+    may ? button('Start here', () => startAt(v, own), { id: `fly-start-${id}`, title: `The mission starts where ${v.name} is` }) : null,
     v.wind ? el('p', { class: v.beyond ? 'bad' : 'note' }, v.wind) : null);
+}
+
+// The start of a vehicle, of the mission that begins, or of the one that is begun next.
+function startAt(v, own) {
+  if (known.state.stage === 'mission') { change({ [`${own.key}.start`]: v.at }); return; }
+  goTo(v.at, NEAR);
+  if (known.state.stage === 'empty') { tell('start here', v); return; }
+  leave();
+  change({ 'vehicles[0].start': v.at });
+  if (!known.state.vehicles[0].goal) enter('goal');
 }

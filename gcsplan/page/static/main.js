@@ -48,9 +48,10 @@ function start() {
   startTimeline();
   startReplayBar();
   startSpace();
-  const panel = byId('panel'), parts = [startResult(), startFleet(), startPlaces(), startZoneList(), startLimits(), startKeys(), startFly()];
+  const panel = byId('panel'), fly = startFly(), parts = [startResult(), startFleet(), startPlaces(), startZoneList(), startLimits(), startKeys(), fly];
   on('state', (state) => { if (state.stage !== 'empty' && !panel.contains(parts[0])) panel.replaceChildren(...parts); });
   startFromNothing(panel);
+  on('state', (state) => { if (state.stage === 'empty' && !panel.contains(fly)) panel.append(fly); }); // behind the form
   startDrop();
   showState();
   connect();

@@ -1,5 +1,5 @@
 // Start from nothing: the ground, the vehicle and the legal ceiling are chosen; then start and goal are clicked.
-import { button, byId, el, refill } from './dom.js';
+import { button, byId, degrees, el, refill } from './dom.js';
 import { numberOf } from './fields.js';
 import { known, on } from './hub.js';
 import { send, step } from './link.js';
@@ -10,16 +10,17 @@ const PRESETS = [['copter', 'Copter, ArduPilot'], ['wing', 'Fixed wing, ArduPilo
 const OFTEN = { m: 120, ft: 400 }; // the ceiling above ground that most laws have
 const CLOSE = 13; // zoom at which a place is shown that was typed
 
-let form = null, asking = 0, draft = null, symbol = 'm', unit_m = 1;
+let form = null, here = null, asking = 0, draft = null, symbol = 'm', unit_m = 1;
 
 export function startFromNothing(panel) {
   on('state', (state) => {
     if (state.stage === 'empty' && (!form || symbol !== state.units.kinds.height[0])) show(panel, state);
-    if (state.stage !== 'empty') form = null;
+    if (state.stage !== 'empty') { form = null; here = null; }
     if (form && byId('start-file')) offer(byId('start-file'), state.files);
     if (state.stage === 'draft' && draft !== state.name) { draft = state.name; begin(state); }
     if (state.stage === 'mission') draft = null;
   });
+  on('start here', (vehicle) => { here = vehicle.at; sayHere(vehicle.name); });
   on('place', (message) => { if (message.n === asking) found(message.at); });
   on('error', (message) => {
     if (!form || (message.n !== asking && message.where !== 'place')) return;
@@ -65,9 +66,17 @@ function show(panel, state) {
       el('div', { class: 'with' }, el('input', { id: 'start-place', type: 'text', 'aria-label': 'Place', 'aria-describedby': 'start-place-problem', placeholder: '36.6175, -84.3892', autocomplete: 'off', onkeydown: enterFinds }),
         button('Show', find, { id: 'start-find' })),
       el('p', { class: 'note' }, 'Degrees, degrees with minutes and seconds, UTM, or MGRS.'), problem('start-place')),
+    el('p', { class: 'note', id: 'start-here', role: 'status', hidden: true }),
     el('p', {}, el('button', { type: 'submit', class: 'main wide', id: 'begin' }, 'Click start and goal')));
   refill(panel, form);
   form.querySelector('[value=copter]').checked = true;
+}
+
+function sayHere(name) {
+  if (!form) return;
+  byId('start-here').textContent = here ? `It starts where ${name} is: ${degrees(here)}.` : '';
+  byId('start-here').hidden = !here;
+  byId('begin').textContent = here ? 'Click the goal' : 'Click start and goal';
 }
 
 const number = (id, value, label, group, choice) => el('input', { id, type: 'text', class: 'number', value, inputmode: 'decimal', 'aria-label': label, oninput: () => pick(group, choice), onfocus: () => pick(group, choice) });
@@ -109,5 +118,5 @@ function submit(event) {
   const wrong = form.querySelector('.problem:not([hidden])');
   if (wrong) { const field = wrong.closest('fieldset, details').querySelector('input'); field.focus(); return; }
   const terrain = { sample: { dem: 'sample:jacksboro' }, flat: { flat_m: height }, file: onFile((byId('start-file') || {}).value) }[ground];
-  step({ type: 'new', terrain, preset: chosen('preset'), max_agl_m: ceiling === 'none' ? null : metres, min_agl_m: Math.min(60, ceiling === 'none' ? 60 : metres / 2), start: null, goal: null });
+  step({ type: 'new', terrain, preset: chosen('preset'), max_agl_m: ceiling === 'none' ? null : metres, min_agl_m: Math.min(60, ceiling === 'none' ? 60 : metres / 2), start: here, goal: null });
 }

@@ -24,6 +24,8 @@ from gcsplan.app.upload import run as uploads
 from gcsplan.app.upload.job import SIM, UploadOptions, broken_off
 from gcsplan.errors import Cancelled, CheckFailed, GcsplanError, InputError, NoMission
 from gcsplan.export.outdir import add_output, outputs_in, retire_outputs, settle_outputs, write_outputs
+from gcsplan.mavlink.link.url import parse_url
+from gcsplan.mission_file.request import MissionFile
 from gcsplan.notes.note import Wording
 from gcsplan.page.edits import Edits
 from gcsplan.page.fleet.time_table import numbers_of
@@ -46,6 +48,8 @@ TICKET_BYTES, TICKET_S = 18, 180.0
 
 MOST_WHERE, MOST_TARGETS = 4000, 200
 """Most characters, and most words, that say where vehicles are."""
+
+NO_PLACE_OF_SIM = "simulated vehicles stand where a plan begins, and there is none yet: give a start and a goal"
 
 PROGRESS_S, HEARD_S = 0.1, 10.0
 PERMISSIONS = ("allow_armed", "ignore_position", "allow_parameters", "atomic")
@@ -73,7 +77,7 @@ class PageSteps:
         self._shown: ShownPlan | None = None
         self._number = self._page = self._connection = 0
         self._ticket: _Ticket | None = None
-        self._where = ""
+        self._where, self._strangers = "", False
         self._live: dict[str, PageMessage] = {}
         self._heard_s: dict[str, float] = {}
         self._live_sent_s = 0.0
@@ -91,6 +95,9 @@ class PageSteps:
         """The plan that the page shows from now on; its number."""
         self._number += 1
         self._shown, self._ticket = ShownPlan(self._number, plan), None
+        if self._strangers:  # who is heard has a name now
+            with suppress(PageError):
+                self._connect({"to": self._where, "n": 0})
         return self._number
 
     def left(self) -> None:
@@ -115,7 +122,7 @@ class PageSteps:
         if kind == "stop":
             self._desk.stop()
         elif kind == "disconnect":
-            self._where, self._live, self._heard_s = "", {}, {}
+            self._where, self._live, self._heard_s, self._strangers = "", {}, {}, False
             self._desk.listen(None)
             self._send(self.state(n))
         elif kind == "connect":
@@ -128,7 +135,7 @@ class PageSteps:
                 lists, unjudged = _lists(message), _flag(message, "allow_unjudged")
                 self._do(n, "written", lambda: self._write(n, shown, lists, allow_unjudged=unjudged))
                 return
-            targets = _targets(message, shown.plan)
+            targets = _targets(message, shown.plan.source, shown.plan)
             if kind == "on_board":
                 self._do(n, kind, lambda: self._on_board(n, shown, targets))
                 return
@@ -273,31 +280,44 @@ class PageSteps:
             yield {name: url if to == SIM else to for name, to in targets.items()}
 
     def _connect(self, message: Mapping[str, Any]) -> None:
-        """Listen to the vehicles of the shown plan. Raises PageError."""
-        if self._shown is None:
-            raise PageError("there is no plan yet: give a start and a goal, then connect", code="not_sent")
-        plan = self._shown.plan
-        targets = _targets(message, plan)
-        sysids = {v.name: v.request.vehicle.sysid for v in plan.vehicles}
-        numbers = numbers_of(plan)
+        """Listen to the vehicles of the mission; before there is one, to all that are heard. Raises PageError."""
+        shown, source = (None, None) if self._edits.planner is None else (self._shown, self._source())
+        if source is None:
+            targets, sysids = {"": _stranger_at(message)}, {"": 0}
+        else:
+            targets = _targets(message, source, None if shown is None else shown.plan)
+            sysids = {request.vehicle.name: request.vehicle.sysid for request in source.vehicles}
+        if shown is None and SIM in targets.values():
+            raise PageError(NO_PLACE_OF_SIM, code="not_sent", where="to")
+        numbers = {} if source is None else {name: k for k, name in enumerate(sysids)}
         self._where, self._live, self._heard_s = str(message["to"]), {}, {}
+        self._strangers = source is None
         self._connection += 1
         connection = self._connection
 
         def listen() -> None:
             from gcsplan.page.steps.live_vehicles import listen_to
 
-            with self._addresses(plan, targets) as where:
+            with nullcontext(targets) if shown is None else self._addresses(shown.plan, targets) as where:
                 seats = {name: (url, sysids[name]) for name, url in where.items()}
 
                 def reported(name: str, state: VehicleState | None, age_s: float) -> None:
                     if connection == self._connection:
-                        self._reported(name, numbers[name], targets[name], state, age_s)
+                        number, url = numbers.get(name, -1), targets.get(name) or targets[""]
+                        self._reported(name, number, url, state, age_s)
 
                 listen_to(seats, reported)
 
         self._desk.listen(listen)
         self._send(self.state(message["n"]))
+
+    def _source(self) -> MissionFile | None:
+        """The mission whose vehicles are known; None as long as it cannot be read."""
+        if self._shown is not None or self._edits.planner is None:
+            return None if self._shown is None else self._shown.plan.source
+        with suppress(InputError):
+            return self._edits.planner.loaded()
+        return None
 
     def _reported(self, name: str, number: int, url: str, state: VehicleState | None, age_s: float) -> None:
         """Send what the vehicles report, all of them at once."""
@@ -329,7 +349,7 @@ class PageSteps:
 
     def _lost(self, why: GcsplanError) -> None:
         """Listening has ended by itself."""
-        self._where, self._live = "", {}
+        self._where, self._live, self._strangers = "", {}, False
         self._send({"type": "error", "n": 0, "code": "not_sent", "message": f"not connected: {why}", "where": "to"})
         self._send(self.state(0))
 
@@ -373,17 +393,35 @@ def _lists(message: Mapping[str, Any]) -> tuple[bool, bool, bool]:
     return fence, rally, infinite
 
 
-def _targets(message: Mapping[str, Any], plan: Plan) -> dict[str, str]:
-    """Vehicle name to URL, as ``--upload`` reads what the user typed. Raises PageError, UsageError."""
+def _targets(message: Mapping[str, Any], source: MissionFile, plan: Plan | None) -> dict[str, str]:
+    """Vehicle name to URL, as ``--upload`` reads what the user typed; of a plan, those that fly. Raises PageError."""
+    words = _words(message)
+    try:
+        to = uploads.targets(words, [r.vehicle for r in source.vehicles])
+    except GcsplanError as why:
+        raise PageError(str(why), code="not_sent", where="to") from None
+    return to if plan is None else {name: to[name] for v in plan.vehicles if (name := v.name) in to}
+
+
+def _words(message: Mapping[str, Any]) -> list[str]:
+    """What the user typed as places of vehicles. Raises PageError."""
     given = message.get("to")
     if not isinstance(given, str) or not given.strip() or len(given) > MOST_WHERE:
         raise PageError("say where the vehicles are: sim, or a link", code="not_sent", where="to")
     words = given.split()
     if len(words) > MOST_TARGETS:
         raise PageError(f"give at most {MOST_TARGETS} links", code="not_sent", where="to")
-    planned = {v.name for v in plan.vehicles}
+    return words
+
+
+def _stranger_at(message: Mapping[str, Any]) -> str:
+    """The one link where all that are heard are shown. Raises PageError."""
+    words = _words(message)
+    if words == [SIM]:
+        raise PageError(NO_PLACE_OF_SIM, code="not_sent", where="to")
+    if len(words) != 1:
+        raise PageError("give one link: the mission has no vehicles yet", code="not_sent", where="to")
     try:
-        to = uploads.targets(words, [r.vehicle for r in plan.source.vehicles])
-        return {name: url for name, url in to.items() if name in planned}
-    except GcsplanError as why:
+        return parse_url(words[0]).url
+    except InputError as why:
         raise PageError(str(why), code="not_sent", where="to") from None

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
+from functools import partial
 
 from gcsplan.mavlink.link.frames import signing_key
 from gcsplan.mavlink.link.link import Channel, Link, LinkSteps, PumpJob, pump
@@ -22,6 +23,12 @@ WATCHER = Address(254, 190)
 """Our ids while we listen: ArduPilot's failsafe for a lost ground station counts the heartbeats of its own one, 255."""
 
 REPORT_S, REQUEST_S, WIND_REQUEST_S = 0.5, 2.0, 10.0
+ANYONE = 0
+"""The system id of a seat for all vehicles that are heard there."""
+
+MOST_STRANGERS = 32
+"""Most vehicles that are followed at such a seat: those that were heard first."""
+
 _POSITION = 33
 
 Reported = Callable[[str, VehicleState | None, float], None]
@@ -29,7 +36,10 @@ Reported = Callable[[str, VehicleState | None, float], None]
 
 
 def listen_to(seats: Mapping[str, tuple[str, int]], reported: Reported) -> None:
-    """Listen to vehicles by name, each at a URL with a system id, until this is cancelled. Raises LinkError."""
+    """Listen to vehicles by name, each at a URL with a system id, until this is cancelled. Raises LinkError.
+
+    At a seat of `ANYONE` all are reported that have sent a heartbeat, each by its `name_of_stranger`.
+    """
     with ExitStack() as stack:
         links: dict[str, Link] = {}
         for url in dict.fromkeys(url for url, _ in seats.values()):
@@ -41,11 +51,32 @@ def listen_to(seats: Mapping[str, tuple[str, int]], reported: Reported) -> None:
         jobs = []
         for name, (url, sysid) in seats.items():
             channel = links[url].channel(sysid)
-            jobs.append(PumpJob(channel, _followed(channel, name, reported)))
+            steps = _all_heard(channel.link, reported) if sysid == ANYONE else _followed(channel, name, reported)
+            jobs.append(PumpJob(channel, steps))
         pump(jobs)
         for job in jobs:
             if job.error is not None:
                 raise job.error
+
+
+def name_of_stranger(sysid: int) -> str:
+    """What a vehicle is called that the mission does not name."""
+    return f"vehicle {sysid}"
+
+
+def _all_heard(link: Link, reported: Reported) -> LinkSteps[None]:
+    """Follow every system that is heard on a link; ground stations and cameras among them report no state."""
+
+    def known(name: str, state: VehicleState | None, age_s: float) -> None:
+        if state is not None:
+            reported(name, state, age_s)
+
+    followed: set[int] = set()
+    while True:
+        for sysid in sorted(link.heard_systems.keys() - followed)[: MOST_STRANGERS - len(followed)]:
+            followed.add(sysid)
+            link.serve(sysid, partial(_followed, name=name_of_stranger(sysid), reported=known))
+        yield link.clock() + REPORT_S
 
 
 def _followed(channel: Channel, name: str, reported: Reported) -> LinkSteps[None]:

@@ -363,3 +363,21 @@ def heard(page: Page) -> dict[str, Any]:
         if found["heard"] and found["at"]:
             return found
     raise AssertionError("it was never heard")
+
+
+@pytest.mark.slow
+def test_vehicles_are_heard_before_there_is_a_plan_and_get_their_names_with_it(tmp_path: Path) -> None:
+    with flying() as (url, vehicle), serving(None, tmp_path) as server, Page(server) as page:
+        for to in ("sim", "udpout:127.0.0.1:1 udpout:127.0.0.1:2", "nowhere"):
+            page.send("connect", to=to)
+            assert page.until("error")["code"] == "not_sent", to
+        page.send("connect", to=url)
+        page.until("steps")
+        [heard] = page.until("live", n=0)["vehicles"]
+        assert (heard["name"], heard["vehicle"], heard["silent"]) == ("vehicle 1", -1, False)
+        page.send("new", terrain={"flat_m": 100}, preset="copter", max_agl_m=None, start=heard["at"])
+        assert page.until("state")["vehicles"][0]["start"] == heard["at"]
+        page.send("change", changes={"vehicles[0].goal": [46.51, 8.51]})
+        page.until("plan")
+        assert eventually(lambda: page.until("live", n=0)["vehicles"][0]["name"] == "uav1")
+        assert vehicle.items() == ()
