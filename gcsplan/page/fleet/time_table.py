@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,6 +12,9 @@ from gcsplan.app.plan.model import Plan
 from gcsplan.fleet.separation import Encounter, Separation
 from gcsplan.report.views.fleet import separation_text
 from gcsplan.units import Units
+
+if TYPE_CHECKING:
+    from gcsplan.app.upload.job import JobResult
 
 SECONDS, METRES, DEGREES = 2, 2, 7
 """Decimals of times, distances and places."""
@@ -42,6 +46,23 @@ def time_table(plan: Plan, units: Units) -> dict[str, Any] | None:
         "mode": fleet.mode, "required": arrival is not None, "interval_s": fleet.interval_s, "rows": rows,
         "end_s": max(row["end_s"] for row in rows), "separation": _separation(plan, apart, units),
     }  # fmt: skip
+
+
+def release_table(plan: Plan, results: Sequence[JobResult]) -> dict[str, Any] | None:
+    """When each vehicle of a fleet is started by hand, in order, and the common start in UTC; None for one vehicle.
+
+    After an upload ``ready`` says whether a vehicle has its mission, else it is None."""
+    fleet = plan.fleet
+    if fleet is None or len(fleet.slots) < 2:
+        return None
+    ready = {d.vehicle for d in results if d.verified and not d.code}
+    windows = {v.name: v.verdict.arrive_window_s(fleet.slot(v.name)) for v in plan.vehicles}
+    rows = [
+        {"name": slot.name, "release_s": slot.depart_s, "arrive_s": slot.arrive_s, "window_s": windows[slot.name],
+         "ready": slot.name in ready if results else None}
+        for slot in sorted(fleet.slots, key=lambda slot: slot.depart_s)
+    ]  # fmt: skip
+    return {"rows": rows, "start_utc": None if fleet.start_utc is None else f"{fleet.start_utc:%Y-%m-%d %H:%M:%S}"}
 
 
 def _nearest(apart: Separation | None, name: str) -> dict[str, Any] | None:

@@ -20,7 +20,7 @@ export function startUpload() {
   on('progress', progress);
   on('uploaded', (message) => { sending = 0; ended(message); });
   on('steps', (message) => { if (sending && !message.busy) { sending = 0; if (message.last) ended(message.last); else dialog.close(); } });
-  on('error', (message) => { if (dialog.open && (message.code === 'not_sent' || message.code === 'internal')) { sending = 0; show('Nothing was sent', [el('p', { class: 'bad', role: 'alert' }, message.message)], [again()]); } });
+  on('error', (message) => { if (dialog.open && (message.code === 'not_sent' || message.code === 'internal')) { sending = 0; show('Nothing was sent', [el('p', { class: 'bad', role: 'alert' }, message.message), permissions()], [again()]); } });
   on('connection', (now) => {
     if (now === 'open' || !dialog.open) return;
     show(sending ? 'The connection with gcsplan is lost' : 'Not connected', [el('p', { class: 'bad', role: 'alert' }, sending
@@ -63,7 +63,7 @@ function looked(message) {
   const words = one ? `Send to ${message.vehicles[0].name}` : ok.length === message.vehicles.length ? `Send to ${ok.length} vehicles` : `Send to ${ok.length} of ${message.vehicles.length} vehicles`;
   const go = button(words, () => start(message), { id: 'upload-send', class: 'main', disabled: !message.ticket });
   show(one ? `Upload to ${message.vehicles[0].name}` : `Upload to ${message.vehicles.length} vehicles`,
-    [...message.vehicles.map(vehicle), ...notes(message.notes), el('p', { class: 'note' }, `The files go to ${message.folder}.`), permissions()], [go, again()], 'Not now');
+    [...message.vehicles.map(vehicle), release(message.release), ...notes(message.notes), el('p', { class: 'note' }, `The files go to ${message.folder}.`), permissions()], [go, again()], 'Not now');
 }
 
 function vehicle(v) {
@@ -87,11 +87,23 @@ function table(heads, rows, bad = []) {
     el('tbody', {}, ...rows.map((row, i) => el('tr', { class: bad[i] ? 'bad' : '' }, ...row.map((cell, k) => el(k ? 'td' : 'th', k ? {} : { scope: 'row' }, cell)))))));
 }
 
+// When each vehicle is started by hand; null for one vehicle, and where a step did not come so far.
+function release(found) {
+  if (!found) return null;
+  const windy = found.rows.some((r) => r.window_s), late = found.rows.map((r) => r.ready === false);
+  return el('section', { id: 'upload-release' }, el('h3', {}, 'Release'), el('p', { class: 'note' }, 'By hand: nothing is armed or started from here.'),
+    table(['', 'release, T+', 'at the goal, T+', ...(windy ? ['within'] : []), ''], found.rows.map((r) => [r.name, duration(r.release_s, 1), duration(r.arrive_s, 1), ...(windy ? [r.window_s ? r.window_s.map((s) => duration(s, 1)).join(' to ') : ''] : []), r.ready === false ? 'not ready' : '']), late),
+    el('p', { class: 'note' }, found.start_utc ? `T+0 is ${found.start_utc} UTC: each vehicle waits in the air for its own second.` : 'T+0 is the moment that you choose.'));
+}
+
 function permissions() {
   return el('details', { open: Object.values(given).some(Boolean), id: 'upload-permissions' }, el('summary', {}, 'Permissions, fence and rally points'),
     ...PERMISSIONS.map(([key, words]) => el('label', { class: 'choice' }, el('input', {
       type: 'checkbox', id: `upload-${key}`, checked: given[key] || false, onchange: (event) => { given = { ...given, [key]: event.target.checked }; look(); },
-    }), words)));
+    }), words)),
+    known.state.vehicles.length > 1 ? el('div', { class: 'row' }, el('label', { for: 'upload-gate' }, 'T+0 by the clock, UTC'), el('input', {
+      id: 'upload-gate', type: 'text', placeholder: '18:30:00', autocomplete: 'off', value: given.gate_utc || '', onchange: (event) => { given = { ...given, gate_utc: event.target.value.trim() }; look(); },
+    }), el('p', { class: 'note' }, 'Each ArduCopter then waits in the air for its second of the day. Nobody knows how long, so it needs “Send what could not be judged”.')) : null);
 }
 
 // -- sending ----------------------------------------------------------------------------------------------------------
@@ -118,7 +130,7 @@ function ended(message) {
   const good = message.code === 0, all = message.vehicles;
   const body = all.length ? all.map(result) : [el('p', { class: 'bad', role: 'alert' }, message.message)];
   show(good ? (all.length === 1 ? `${all[0].name} is verified` : `${all.length} vehicles are verified`) : 'Not verified',
-    [el('p', { class: `verdict ${good ? 'safe' : 'unsafe'}`, role: 'status', id: 'upload-end' }, good ? 'The mission was read back, is equal item for item, and passes the check.' : `Exit code ${message.code}: ${message.reason}`), ...body, ...notes(message.notes)],
+    [el('p', { class: `verdict ${good ? 'safe' : 'unsafe'}`, role: 'status', id: 'upload-end' }, good ? 'The mission was read back, is equal item for item, and passes the check.' : `Exit code ${message.code}: ${message.reason}`), ...body, release(message.release), ...notes(message.notes)],
     good ? [el('a', { class: 'button', href: 'report.html', target: '_blank' }, 'Briefing')] : [again()]);
 }
 

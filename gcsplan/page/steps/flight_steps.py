@@ -13,9 +13,12 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from gcsplan.app.fleet import pipeline
+from gcsplan.app.fleet.start_time import GateTime
 from gcsplan.app.output import files as outputs
 from gcsplan.app.output.handout import Handout, handout
 from gcsplan.app.plan.earlier import last_plan
@@ -28,7 +31,7 @@ from gcsplan.mavlink.link.url import parse_url
 from gcsplan.mission_file.request import MissionFile
 from gcsplan.notes.note import Wording
 from gcsplan.page.edits import Edits
-from gcsplan.page.fleet.time_table import numbers_of
+from gcsplan.page.fleet.time_table import numbers_of, release_table
 from gcsplan.page.map_session import PageMessage
 from gcsplan.page.refused import PageError
 from gcsplan.page.steps.shown_plan import ShownPlan
@@ -64,6 +67,7 @@ class _Ticket:
     options: UploadOptions
     until_s: float
     page: int
+    gate: GateTime | None
 
 
 class PageSteps:
@@ -141,8 +145,8 @@ class PageSteps:
                 return
             options = UploadOptions(**{key: _flag(message, key) for key in PERMISSIONS})
             lists, unjudged, page = _lists(message), _flag(message, "allow_unjudged"), self._page
-            self._ticket = None
-            self._do(n, "looked", lambda: self._look(n, shown, targets, options, lists, page, unjudged))
+            gate, self._ticket = _gate(message), None
+            self._do(n, "looked", lambda: self._look(n, shown, targets, options, lists, page, unjudged, gate))
 
     def _require_shown(self, message: Mapping[str, Any]) -> ShownPlan:
         if self._desk.busy:  # before the files are read again, which takes long
@@ -170,10 +174,15 @@ class PageSteps:
     # -- write ---------------------------------------------------------------------------------------------------
 
     def _handed(
-        self, shown: ShownPlan, targets: Mapping[str, str], lists: tuple[bool, bool, bool], *, allow_unjudged: bool
+        self, shown: ShownPlan, targets: Mapping[str, str], lists: tuple[bool, bool, bool], *, allow_unjudged: bool,
+        gate: GateTime | None = None,
     ) -> Handout:
-        """What the command line hands out with ``--report``. Raises GcsplanError; earlier outputs are retired then."""
-        plan, directory = shown.plan, shown.folder
+        """What the command line hands out with ``--report``. Raises GcsplanError; earlier outputs are retired then.
+
+        With ``gate`` the mission is planned again, as the command line does: its vehicles wait for their seconds.
+        """
+        plan = shown.plan if gate is None else pipeline.plan(shown.plan.source, gate_utc=gate.start)
+        directory = shown.folder
         settle_outputs(directory)
         earlier = [last_plan(plan.source, directory)[0]] if outputs_in(directory) else []
         try:
@@ -202,23 +211,24 @@ class PageSteps:
 
     def _look(
         self, n: int, shown: ShownPlan, targets: Mapping[str, str], options: UploadOptions,
-        lists: tuple[bool, bool, bool], page: int, allow_unjudged: bool,
+        lists: tuple[bool, bool, bool], page: int, allow_unjudged: bool, gate: GateTime | None,
     ) -> PageMessage:  # fmt: skip
         from gcsplan.page.steps.words import look_of
 
-        handed = self._handed(shown, targets, lists, allow_unjudged=allow_unjudged)
+        handed = self._handed(shown, targets, lists, allow_unjudged=allow_unjudged, gate=gate)
         seen = uploads.look(handed.jobs, options, simulator=self._desk.simulator)
         vehicles = [look_of(handed, job, seen[job.name], self._units()) for job in handed.jobs]
         may_go = any(v["found"] and not v["against"] for v in vehicles)
         ticket = secrets.token_urlsafe(TICKET_BYTES) if may_go and page == self._page else ""
         if ticket:
-            self._ticket = _Ticket(ticket, shown, handed, options, time.monotonic() + TICKET_S, page)
+            self._ticket = _Ticket(ticket, shown, handed, options, time.monotonic() + TICKET_S, page, gate)
         wording = Wording(self._units())
         notes = [f"{name}: {note.text(wording)}" for name, note in handed.notes]
         notes += [f"{left.name} is left out: {left.message}" for left in handed.plan.left_out]
         notes += [] if shown.saved else ["the edits are not saved: the mission file does not have what is sent"]
         return {"type": "looked", "n": n, "code": 0, "message": "", "plan": shown.number, "ticket": ticket,
-                "vehicles": vehicles, "notes": notes, "folder": str(shown.folder)}  # fmt: skip
+                "vehicles": vehicles, "notes": notes, "folder": str(shown.folder),
+                "release": release_table(handed.plan, ())}  # fmt: skip
 
     def _upload(self, message: Mapping[str, Any]) -> None:
         """Send what a look has shown. Raises PageError without its ticket."""
@@ -236,6 +246,8 @@ class PageSteps:
     def _sent(self, n: int, ticket: _Ticket) -> PageMessage:
         handed, names = ticket.handed, [job.name for job in ticket.handed.jobs]
         folder = ticket.shown.folder
+        if ticket.gate is not None:
+            ticket.gate.require_ahead(datetime.now(UTC))
         self._send(self._written(n, folder, handed))
         progress = _Progress(n, self._send)
         try:
@@ -255,7 +267,7 @@ class PageSteps:
         return {
             "type": "uploaded", "n": n, "code": failure["code"], "reason": failure["reason"],
             "message": failure["message"], "vehicles": [result_of(r, self._units()) for r in results],
-            "notes": [noted] if noted else [],
+            "notes": [noted] if noted else [], "release": release_table(handed.plan, results),
         }  # fmt: skip
 
     # -- vehicles ------------------------------------------------------------------------------------------------
@@ -391,6 +403,17 @@ def _flag(message: Mapping[str, Any], key: str) -> bool:
 def _lists(message: Mapping[str, Any]) -> tuple[bool, bool, bool]:
     fence, rally, infinite = (_flag(message, key) for key in LISTS)
     return fence, rally, infinite
+
+
+def _gate(message: Mapping[str, Any]) -> GateTime | None:
+    """The common start, as ``--gate-utc`` reads it; None if there is none. Raises PageError."""
+    given = message.get("gate_utc") or ""
+    if not isinstance(given, str) or len(given) > MOST_WHERE:
+        raise PageError("a common start is a text such as 18:30:00", code="bad_message", where="gate_utc")
+    try:
+        return GateTime.parse(given.strip(), datetime.now(UTC)) if given.strip() else None
+    except GcsplanError as why:
+        raise PageError(f"nothing was sent: {why.message}", code="not_sent", where="gate_utc") from None
 
 
 def _targets(message: Mapping[str, Any], source: MissionFile, plan: Plan | None) -> dict[str, str]:

@@ -10,6 +10,7 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -381,3 +382,27 @@ def test_vehicles_are_heard_before_there_is_a_plan_and_get_their_names_with_it(t
         page.until("plan")
         assert eventually(lambda: page.until("live", n=0)["vehicles"][0]["name"] == "uav1")
         assert vehicle.items() == ()
+
+
+@pytest.mark.nightly
+def test_a_fleet_is_released_by_the_table_of_the_command_line_and_may_have_gates(tmp_path: Path) -> None:
+    second = FLAT.partition("vehicles:\n")[2].replace("uav1", "uav2").replace("sysid: 1", "sysid: 2")
+    second = second.replace("8.5]   #", "8.52]   #").replace("8.51]", "8.53]")
+    rule = "arrival: {mode: sequence, interval_s: 20, separation_m: 30}\n"
+    with field(tmp_path, FLAT + second + rule) as (server, file), Page(server) as page:
+        number = shown(page)
+        start = datetime.now(UTC) + timedelta(hours=1)
+        for wrong in ("soon", f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}"):
+            assert look(page, number, gate_utc=wrong)["code"] == "not_sent"
+        assert look(page, number, gate_utc=f"{start:%Y-%m-%dT%H:%M:%SZ}")["code"] == 4  # by nobody judged
+        gated = look(page, number, gate_utc=f"{start:%Y-%m-%dT%H:%M:%SZ}", allow_unjudged=True)
+        assert gated["release"]["start_utc"] == f"{start:%Y-%m-%d %H:%M:%S}"
+        found = look(page, number)
+        assert found["release"]["start_utc"] is None
+        done = upload(page, found["ticket"], number)
+        rows = done["release"]["rows"]
+        assert (done["code"], [row["ready"] for row in rows]) == (0, [True, True])
+        fleet = plan(load_mission(file)).fleet
+        assert fleet is not None
+        assert {row["name"]: row["release_s"] for row in rows} == {s.name: s.depart_s for s in fleet.slots}
+        assert {row["name"]: row["arrive_s"] for row in rows} == {s.name: s.arrive_s for s in fleet.slots}
