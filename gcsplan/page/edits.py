@@ -23,7 +23,7 @@ from gcsplan.mission_file.changes import saved_text
 from gcsplan.mission_file.new_file import Draft, place_text, text_of
 from gcsplan.mission_file.source import is_sample, read_content
 from gcsplan.page.fleet.crew_changes import with_crew
-from gcsplan.page.form import require_changes, require_own_files
+from gcsplan.page.form import require_changes, require_own_files, without_empty
 from gcsplan.page.history import EditedDocument, EditHistory
 from gcsplan.page.places import place_of, with_heights
 from gcsplan.page.refused import PageError
@@ -139,11 +139,12 @@ class Edits:
         if live:
             self._live |= changes
             return
-        self.make(changes)
+        self.make(without_empty(self.planner.mission, changes))
 
     def make(self, changes: Mapping[str, object]) -> None:
         """Change any keys of a mission, which the server itself has checked; one step of undo. Raises PageError."""
-        assert self.planner is not None
+        if self.planner is None:
+            raise PageError("there is no mission yet: choose the ground first", code="bad_change")
         self._live.clear()
         before = self._state
         try:

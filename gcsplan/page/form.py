@@ -31,6 +31,9 @@ FormGroup = Literal["limits", "vehicle", "planner"]
 MOST_CHANGES = 100
 """Most keys of one message."""
 
+MOST_ENTRIES = 200
+"""Most entries of a list that have a row each."""
+
 MOST_FIELD_TEXT = 100_000
 """Most characters of a value that is typed as YAML."""
 
@@ -150,7 +153,7 @@ def _field(section: str, key: str, document: EditedDocument, problems: Sequence[
         "key": place, "group": section, "label": _label(key), "help": entry.get("description", ""),
         "kind": "fixed" if reason else kind, "quantity": None if other or kind != "number" else quantity_of(key),
         "unit": unit, "value": value, "default": default if isinstance(default, int | float | str) else None,
-        "choices": choices, "reason": reason,
+        "choices": choices, "reason": reason, "list": None if reason else entries_of(entry, found.get(name)),
         "error": next((p.message for p in problems if _is_at(p.key, place, kind)), None),
     }  # fmt: skip
 
@@ -165,6 +168,32 @@ def field_kind(entry: Mapping[str, Any]) -> tuple[str, list[str]]:
         return "choice", list(form["enum"])
     kinds = {"number": "number", "integer": "number", "string": "text", "boolean": "boolean"}
     return kinds.get(form.get("type", ""), "yaml"), []
+
+
+def entries_of(entry: Mapping[str, Any], value: object) -> dict[str, Any] | None:
+    """The entries of a list, as the file writes them, and what the schema says of one: its choices, or its keys.
+
+    None for a key that is no list of any length, has another form now, or has more than `MOST_ENTRIES`.
+    """
+    form = next((f for f in _forms(entry) if f.get("type") == "array" and f.get("minItems") != f.get("maxItems", "")), None)
+    if form is None or not isinstance(value, list | None) or len(value or ()) > MOST_ENTRIES:
+        return None
+    items = form["items"]
+    part = _schema()["$defs"].get(items.get("$ref", "").rpartition("/")[2], {})
+    keys = ", ".join(f"{key}: …" for key in part.get("required", part.get("properties", ())))
+    return {
+        "entries": [flow(v) for v in value or ()], "most": form.get("maxItems", MOST_ENTRIES),
+        "choices": items.get("enum", []), "like": f"{{{keys}}}" if keys else "",
+    }  # fmt: skip
+
+
+def _forms(entry: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
+    """The forms that a value may have, by the schema."""
+    inner = [form for key in ("anyOf", "oneOf") for form in entry.get(key, ())]
+    for form in inner:
+        yield from _forms(form)
+    if not inner:
+        yield entry
 
 
 def quantity_of(key: str) -> Kind | None:
@@ -230,6 +259,18 @@ def changes_of(message: Mapping[str, Any]) -> object:
     return found
 
 
+def arranged(document: EditedDocument, message: Mapping[str, Any]) -> dict[str, object]:
+    """The change that moves an entry of a list of sections (``list``, ``from``, ``to``). Raises PageError."""
+    name, begin, end = message.get("list"), message.get("from"), message.get("to")
+    lists = [section.removesuffix("[]") for section in SECTIONS if section.endswith("[]")]
+    entries = document.get(name) if name in lists else None
+    count = len(entries) if isinstance(entries, list) else 0
+    if isinstance(entries, list) and type(begin) is type(end) is int and 0 <= begin < count and 0 <= end < count:
+        entries.insert(end, entries.pop(begin))
+        return {str(name): entries}
+    raise PageError(f"an entry of {', '.join(lists)} is moved to the place of another one", code="bad_change", where="list")
+
+
 def require_changes(changes: object) -> Mapping[str, object]:
     """The changes of a message. Raises PageError for a key that the page may not change: none names a file."""
     if not isinstance(changes, dict) or not 0 < len(changes) <= MOST_CHANGES:
@@ -238,6 +279,12 @@ def require_changes(changes: object) -> Mapping[str, object]:
         if not (is_crew_key(place, value) or _may_change(place, value)):
             raise PageError("this key cannot be changed on the page", code="bad_change", where=place[:80])
     return changes
+
+
+def without_empty(document: EditedDocument, changes: Mapping[str, object]) -> dict[str, object]:
+    """The changes, in which a list of zones whose only entry goes is left out: an empty one is a mistake."""
+    alone = {f"{name}[0]": name for name in ("no_fly", "keep_in") if len(document.get(name) or ()) == 1}
+    return {alone.get(place, place) if value is None else place: value for place, value in changes.items()}
 
 
 def _may_change(place: str, value: object) -> bool:

@@ -29,7 +29,7 @@ from gcsplan.page.dropped.shelf import Shelf, endings
 from gcsplan.page.edits import Edits, terrain_choices
 from gcsplan.page.fleet.crew_changes import arrival_of
 from gcsplan.page.fleet.scene import scene_answer
-from gcsplan.page.form import changes_of, section_form, short_form
+from gcsplan.page.form import arranged, changes_of, section_form, short_form
 from gcsplan.page.ground_tiles import LEAST_ZOOM, MOST_ZOOM, GroundTiles, contour_interval_m
 from gcsplan.page.history import EditedDocument
 from gcsplan.page.places import read_text, vehicles_of
@@ -261,6 +261,9 @@ class MapSession:
         elif kind == "take":
             self._dropped.take(message)
             self._zones, self._tiles_of = KeptWorld(), None  # a file may have been replaced
+            self._unkept = True
+        elif kind == "arrange":
+            edits.make(arranged(edits.document, message))
             self._unkept = True
         elif kind == "units":
             name = message.get("units")

@@ -11,8 +11,10 @@ from gcsplan.errors import InputError
 from gcsplan.mission_file.json_schema import mission_schema
 from gcsplan.mission_file.values.units import other_names
 from gcsplan.page.form import (
+    MOST_ENTRIES,
     SECTIONS,
     YAML_ONLY,
+    arranged,
     changes_of,
     keys_of,
     part_of,
@@ -95,3 +97,29 @@ def test_a_text_names_no_file_outside_of_the_folder_but_those_it_had(tmp_path: P
     with pytest.raises(InputError) as why:
         require_own_files(wrong, before, tmp_path, text)
     assert [(p.where, p.in_line) for p in why.value.problems] == [("terrain.dem", 1), ("keep_in[0].file", 3)]
+
+
+def test_a_list_has_a_row_for_each_entry_and_says_what_one_may_be() -> None:
+    document: dict[str, Any] = {"wind": {"levels": [{"agl_m": 10}]}, "vehicles": [{"via": [[1, 2], "46 N, 8 E"]}]}
+    fields = {f["key"]: f["list"] for s in ("wind", "vehicles[0]", "no_fly[0]")
+              for f in section_form(s, document, [])["fields"]}  # fmt: skip
+    assert fields["wind.levels"]["entries"] == ["{agl_m: 10}"]
+    assert fields["wind.levels"]["like"].startswith("{")
+    assert fields["vehicles[0].via"]["entries"] == ["[1, 2]", '"46 N, 8 E"']
+    assert fields["no_fly[0].ignore"]["choices"] == ["points", "lines", "empty"]
+    assert {key for key in fields if key.startswith("no_fly") and fields[key]} == {
+        f"no_fly[0].{key}" for key in ("polygon", "line", "ignore", "kinds", "authorised")
+    }
+    assert fields["wind.speed_m_s"] is fields["vehicles[0].start"] is None  # of a fixed length
+    document["vehicles"][0]["via"] = [[1, 2]] * (MOST_ENTRIES + 1)
+    long = {f["key"]: f["list"] for f in section_form("vehicles[0]", document, [])["fields"]}
+    assert long["vehicles[0].via"] is None
+
+
+def test_an_entry_of_a_section_is_moved_to_the_place_of_another() -> None:
+    document = {"no_fly": [{"name": "a"}, {"file": "b.kml"}, {"name": "c"}]}
+    move = {"list": "no_fly", "from": 2, "to": 0}
+    assert arranged(document, move) == {"no_fly": [{"name": "c"}, {"name": "a"}, {"file": "b.kml"}]}
+    for wrong in ({"list": "terrain"}, {"list": "keep_in"}, {"list": []}, {"from": 3}, {"to": -1}, {"to": True}, {"to": "0"}):
+        with pytest.raises(PageError):
+            arranged(document, move | wrong)

@@ -359,7 +359,20 @@ def test_no_message_of_a_hostile_page_is_a_bug(file: Path, seed: int) -> None:
     rng = random.Random(seed)
     needs = {"change": "changes", "new": "preset", "set_text": "text", "save": "name", "look": "to", "write": "fence",
              "inspect": "settings", "take": "settings", "scene": "on"}  # fmt: skip
-    kinds = (*needs, "units", "vehicle", "section", "undo", "redo", "reload", "cancel", "hello", "upload", "stop")
+    kinds = (
+        *needs,
+        "units",
+        "vehicle",
+        "section",
+        "arrange",
+        "undo",
+        "redo",
+        "reload",
+        "cancel",
+        "hello",
+        "upload",
+        "stop",
+    )
     fields = ("terrain", "live", "yaml", "plan", "ticket", "as", "over", "start", "goal", "max_agl_m", "vehicle")
     with desk_of(file, file.parent) as desk:
         desk.ask("hello", "plan")
@@ -369,3 +382,23 @@ def test_no_message_of_a_hostile_page_is_a_bug(file: Path, seed: int) -> None:
             desk.send(kind, **more | {needs.get(kind, kind): rng.choice(STRANGE)})
             desk.ask("place", "place", text="46.5, 8.5")
     assert [a for a in desk.heard if a.get("code") == "internal"] == []
+
+
+@pytest.mark.slow
+def test_lists_gain_lose_and_reorder_entries_with_comments_and_undo(desk: Desk) -> None:
+    desk.ask("hello", "plan")
+    before = desk.ask("text", "text")["text"]
+    desk.ask("arrange", "plan", list="no_fly", **{"from": 1, "to": 0})
+    moved = desk.ask("text", "text")["text"]
+    assert sorted(moved.splitlines()) == sorted(before.splitlines())
+    assert moved.index("# the pond") < moved.index("# the mast")
+    typed = {"vehicles[0].via": "[[46.504, 8.507], [46.506, 8.508]]"}
+    desk.ask("change", "plan", changes={}, yaml=typed)
+    desk.ask("change", "plan", changes={}, yaml={"vehicles[0].via": "[[46.506, 8.508], [46.504, 8.507]]"})
+    fields = {f["key"]: f for f in desk.ask("section", "section", section="vehicles[0]")["fields"]}
+    assert fields["vehicles[0].via"]["list"]["entries"][0] == "[46.506, 8.508]"
+    desk.ask("change", "plan", changes={"keep_in[0]": {"name": "all", "center": [46.505, 8.505], "radius_m": 5000}})
+    desk.ask("change", "plan", changes={"keep_in[0]": None})
+    for _ in range(5):
+        desk.ask("undo", "plan")
+    assert desk.ask("text", "text")["text"] == before

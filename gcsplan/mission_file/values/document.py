@@ -94,6 +94,8 @@ class _Writing:
         if isinstance(node, yaml.MappingNode) and isinstance(old, dict) and isinstance(new, dict) and node.value:
             return self.mapping(node, old, new)
         lists = isinstance(old, list) and isinstance(new, list)
+        if isinstance(node, yaml.SequenceNode) and lists and (order := _order(old, new)):
+            return self._reordered(node, order)
         if isinstance(node, yaml.SequenceNode) and lists and not node.flow_style:
             mark = len(self.spans)
             if self._entries(node, old, new):
@@ -141,6 +143,25 @@ class _Writing:
             self._below(node.value[max(stays)], lines, node.start_mark.column)
         return True
 
+    def _reordered(self, node: yaml.SequenceNode, order: list[int]) -> bool:
+        """A list in another order: each entry takes its text along, in a block its lines with the comments above and
+        below it that are its own."""
+        if node.flow_style:
+            own = [(inner.start_mark.index, _end(inner)) for inner in node.value]
+        else:
+            own = [self._lines_of(inner, node.start_mark.column) for inner in node.value]
+        texts = [self.text[begin:end] for begin, end in own]
+        self.spans += [(begin, end, texts[k]) for (begin, end), k in zip(own, order, strict=True)]
+        return node.flow_style or all(text.lstrip()[:1] in ("-", "#") for text in texts)
+
+    def _lines_of(self, entry: yaml.Node, column: int) -> tuple[int, int]:
+        """The lines of an entry of a block whose dash is at a column, without the last line end."""
+        begin = self.text.rfind("\n", 0, entry.start_mark.index) + 1
+        above = re.compile(rf" {{{column}}}#[^\n]*\n")
+        while begin and above.fullmatch(self.text, before := self.text.rfind("\n", 0, begin - 1) + 1, begin):
+            begin = before
+        return begin, self._behind(entry, column)
+
     def _into_flow(self, node: yaml.CollectionNode, parts: list[str], own: Any) -> None:
         """Behind the last member, or between the brackets of an empty collection."""
         at = _end(node.value[-1]) if own else node.end_mark.index - 1
@@ -156,8 +177,12 @@ class _Writing:
         return before == ("" if isinstance(member, tuple) else "-")
 
     def _below(self, node: yaml.Node, lines: list[str], column: int) -> None:
-        """In lines of their own, which begin at a column, behind the line in which a value ends, and behind comments
-        below it that are farther in: they are the value's own."""
+        """In lines of their own, which begin at a column, behind the lines of a value."""
+        stop = self._behind(node, column)
+        self.spans.append((stop, stop, "".join(self.line_end + line for line in lines)))
+
+    def _behind(self, node: yaml.Node, column: int) -> int:
+        """The end of the line in which a value ends, or of the comments below it that are farther in: its own."""
         end = _end(node)
         if self.text[end - 1 : end] == "\n":  # behind a block of text
             end -= 1
@@ -166,7 +191,17 @@ class _Writing:
         own = re.compile(rf"\r?\n {{{column + 1},}}#[^\r\n]*")
         while found := own.match(self.text, stop):
             stop = found.end()
-        self.spans.append((stop, stop, "".join(self.line_end + line for line in lines)))
+        return stop
+
+
+def _order(old: list[Any], new: list[Any]) -> list[int]:
+    """The number in ``old`` of each entry of ``new``, if both have equal entries in another order; else nothing."""
+    places: dict[str, list[int]] = {}
+    if len(old) == len(new) and old != new:
+        for k, value in enumerate(old):
+            places.setdefault(repr(value), []).insert(0, k)
+    order = [found.pop() for value in new if (found := places.get(repr(value)))]
+    return order if len(order) == len(new) else []
 
 
 def _staying(old: list[Any], new: list[Any]) -> dict[int, int]:

@@ -1,5 +1,5 @@
 // Fields of a form: a row with its label, its unit and its default, and below it what is wrong with it.
-import { button, el } from './dom.js';
+import { button, el, refill } from './dom.js';
 import { known, on } from './hub.js';
 import { change, step } from './link.js';
 
@@ -42,7 +42,7 @@ export function rowOf(field, before, wide = false) {
   const help = [field.help, field.kind === 'yaml' ? 'As in the file.' : '', field.reason ? `Not here: ${field.reason}.` : ''].filter((w) => w).join(' ');
   return el('div', { class: `row of-${field.kind}` }, el('label', { for: name }, field.label, wide ? el('code', {}, field.key.split('.').pop()) : null), input,
     el('span', { class: 'unit' }, unit(field)), el('p', { id: `${name}-help`, class: 'help', hidden: !wide }, ...help.split('`').map((part, k) => (k % 2 ? el('code', {}, part) : part))),
-    el('p', { class: 'problem', id: `${name}-problem`, role: 'alert', hidden: true }));
+    el('p', { class: 'problem', id: `${name}-problem`, role: 'alert', hidden: true }), field.list ? el('ol', { class: 'entries', id: `${name}-entries` }) : null);
 }
 
 export function fillField(box, field, before) {
@@ -52,6 +52,25 @@ export function fillField(box, field, before) {
   if (!input.dataset.typed) input.value = word(field.value); // what is being typed stays
   if (input.tagName === 'INPUT') input.placeholder = field.default === null || field.default === undefined ? 'none' : word(field.default);
   complain(name, field.error || '', box);
+  if (field.list) fillEntries(box.querySelector(`#${name}-entries`), field, name);
+}
+
+// The entries of a list, a row each: changed, moved, removed; and a row for one more.
+function fillEntries(rows, field, name) {
+  const { entries, most, choices, like } = field.list, drawn = JSON.stringify(entries);
+  if (!rows || rows.dataset.drawn === drawn) return; // what is being typed stays
+  rows.dataset.drawn = drawn;
+  const put = (texts) => { if (texts.length) step({ type: 'change', changes: {}, yaml: { [field.key]: `[${texts.join(', ')}]` } }); else change({ [field.key]: null }); };
+  const without = (k) => entries.filter((_, i) => i !== k), moved = (k, to) => [...without(k).slice(0, to), entries[k], ...without(k).slice(to)];
+  const typing = (id, value, words, onchange) => (choices.length
+    ? el('select', { id, 'aria-label': words, onchange }, ...['', ...choices].map((c) => el('option', { value: c, selected: c === value }, c)))
+    : el('input', { id, type: 'text', value, placeholder: like, 'aria-label': words, autocomplete: 'off', spellcheck: 'false', onchange }));
+  const act = (k, sign, words, press, off) => button(sign, press, { id: `${name}-${k}-${words.split(' ')[0]}`, 'aria-label': `${words}: ${field.label} ${k + 1}`, title: words, disabled: off });
+  const row = (text, k) => el('li', {},
+    typing(`${name}-${k}`, text, `${field.label} ${k + 1}`, (event) => { const now = event.target.value.trim(); put(now ? entries.map((old, i) => (i === k ? now : old)) : without(k)); }),
+    act(k, '↑', 'Up', () => put(moved(k, k - 1)), k === 0), act(k, '↓', 'Down', () => put(moved(k, k + 1)), k === entries.length - 1), act(k, '✕', 'Remove it', () => put(without(k)), false));
+  const more = typing(`${name}-more`, '', `One more of ${field.label}`, null);
+  refill(rows, ...entries.map(row), entries.length < most ? el('li', {}, more, button('Add', () => { if (more.value.trim()) put([...entries, more.value.trim()]); else more.focus(); }, { id: `${name}-add` })) : null);
 }
 
 function complain(id, words, box = document) {

@@ -2,7 +2,10 @@
 import { button, byId, el } from './dom.js';
 import { fillField, removal, rowOf } from './fields.js';
 import { known, on } from './hub.js';
-import { send, step } from './link.js';
+import { change, send, step } from './link.js';
+import { across_m, middle } from './map.js';
+import { enter } from './modes.js';
+import { add } from './zones.js';
 
 const MOST_BYTES = 240000, MOST_ENTRIES = 500;
 const OFTEN = [['', 'Mission'], ['terrain', 'Terrain'], ['limits', 'Limits of all'], ['planner', 'Planner'], ['wind', 'Wind'], ['arrival', 'Arrival'], ['frame', 'Local frame']];
@@ -57,12 +60,26 @@ function ask() {
 
 function fill(message) {
   if (message.section !== section) return;
-  const keys = JSON.stringify([section, message.may_go, message.fields.map((f) => [f.key, f.kind]), known.state.units.name]), box = byId('fields');
+  const keys = JSON.stringify([section, message.may_go, message.there, known.state.counts, known.state.vehicles.length, message.fields.map((f) => [f.key, f.kind, Boolean(f.list)]), known.state.units.name]), box = byId('fields');
   if (keys !== drawn) {
     drawn = keys;
-    box.replaceChildren(...message.fields.map((f) => rowOf(f, 'key', true)), ...(message.may_go ? [removal(section)] : []));
+    box.replaceChildren(listActs(), ...(message.there ? [] : [el('p', { class: 'note' }, 'The mission does not have this section: the first value adds it.')]), ...message.fields.map((f) => rowOf(f, 'key', true)), ...(message.may_go ? [removal(section)] : []));
   }
   for (const field of message.fields) fillField(box, field, 'key');
+}
+
+// What the lists of vehicles, zones and areas gain, lose and reorder.
+function listActs() {
+  const { counts, vehicles } = known.state, found = /^(vehicles|no_fly|keep_in)\[(\d+)\]/.exec(section), list = found && found[1], k = found && Number(found[2]);
+  const count = { ...counts, vehicles: vehicles.length }[list];
+  const move = (to) => { step({ type: 'arrange', list, from: k, to }); section = `${list}[${to}]`; };
+  const area = (where, part, word) => { section = add({ center: middle(), radius_m: Math.max(1, Math.round(across_m() / part)) }, where, word); };
+  return el('div', { class: 'buttons', id: 'list-acts', role: 'toolbar', 'aria-label': 'Lists of the mission' },
+    ...(found ? [button('↑ Earlier', () => move(k - 1), { id: 'entry-up', disabled: k === 0 }), button('↓ Later', () => move(k + 1), { id: 'entry-down', disabled: k === count - 1 }),
+      button('Remove it', () => change({ [`${list}[${k}]`]: null }), { id: 'entry-remove', disabled: list === 'vehicles' && count < 2 })] : []),
+    button('Add a vehicle', () => { close(); enter('crew-start'); }, { id: 'add-vehicle', title: 'Click its start, then its goal' }),
+    button('Add a no-fly zone', () => area('no_fly', 16, 'zone'), { id: 'add-no-fly', title: 'A circle in the middle of the map' }),
+    button('Add an area to stay inside', () => area('keep_in', 2, 'area'), { id: 'add-keep-in', title: 'A circle as wide as the map' }));
 }
 
 // -- the text ---------------------------------------------------------------------------------------------------------

@@ -67,6 +67,11 @@ export function moved(from, dx, dy) {
   const [x, y] = pixel(from);
   return placeOf(map.unproject([x + dx, y + dy]));
 }
+// Metres of the ground from the left edge of the map to the right one.
+export function across_m() {
+  const box = map.getBounds(), [lat] = middle();
+  return (Math.abs(box.getEast() - box.getWest()) * 40075016.7 * Math.cos((lat * Math.PI) / 180)) / 360;
+}
 export const size = () => [map.getCanvas().clientWidth, map.getCanvas().clientHeight];
 
 function fit() {

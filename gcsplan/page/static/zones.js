@@ -54,15 +54,17 @@ export function select(key) {
 
 // -- new ones ---------------------------------------------------------------------------------------------------------
 
-function add(shape) {
+// A new entry of a list of zones; its key.
+export function add(shape, list = 'no_fly', word = 'zone') {
   const taken = new Set(zones().map((f) => f.properties.name));
   let number = 1;
-  while (taken.has(`zone ${number}`)) number += 1;
-  const key = `no_fly[${known.state.counts.no_fly}]`;
+  while (taken.has(`${word} ${number}`)) number += 1;
+  const key = `${list}[${known.state.counts[list]}]`;
   sketch(null);
   chosen = key;
-  change({ [key]: { name: `zone ${number}`, ...shape } });
+  change({ [key]: { name: `${word} ${number}`, ...shape } });
   tell('chosen', key);
+  return key;
 }
 
 function pressCircle(event, centre) {

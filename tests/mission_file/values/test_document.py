@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import permutations
+
 import pytest
 
 from gcsplan.mission_file.values.document import flow, with_document
@@ -82,3 +84,38 @@ def test_a_key_that_goes_has_no_place(text: str) -> None:
 @pytest.mark.parametrize("value", ["no", "1", "", "a: b", "ünd", "x#", True, None, 1e-5, [1, {"a": 2.5}], -0.0, 1e300])
 def test_a_value_on_one_line_is_read_as_itself(value: object) -> None:
     assert read_yaml(f"a: {flow(value)}", where="") == {"a": value}
+
+
+LISTED = """\
+no_fly:
+  # the mast, since May
+  - name: mast   # of steel
+    radius_m: 5
+      # its height is not known
+  - {name: pond}   # the pond
+
+  # the wood
+  - name: wood
+after: 1"""
+
+
+@pytest.mark.parametrize("order", list(permutations(range(3))))
+def test_an_entry_that_is_moved_takes_its_comments_along(order: tuple[int, ...]) -> None:
+    old = read_yaml(LISTED, where="")
+    new = {**old, "no_fly": [old["no_fly"][k] for k in order]}
+    text = with_document(LISTED, new)
+    assert text is not None
+    assert read_yaml(text, where="") == new
+    assert sorted(text.splitlines()) == sorted(LISTED.splitlines())
+    lines = text.splitlines()
+    for above, below in (("  # the mast, since May", "  - name: mast   # of steel"), ("  # the wood", "  - name: wood")):
+        assert lines[lines.index(below) - 1] == above
+    assert lines[lines.index("    radius_m: 5") + 1] == "      # its height is not known"
+
+
+@pytest.mark.parametrize("text", ["a: [1, 2 , 3]  # x\n", "a:\r\n- 1\r\n- 2 # two\r\n- 3", "a: [1,\n 2, # two\n 3]\n"])
+def test_a_list_of_numbers_is_moved_in_place(text: str) -> None:
+    found = with_document(text, {"a": [3, 1, 2]})
+    assert found is not None
+    assert read_yaml(found, where="") == {"a": [3, 1, 2]}
+    assert len(found) == len(text)
