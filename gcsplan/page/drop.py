@@ -6,6 +6,7 @@ A file is read as the command line reads it. Nothing is written before `take`, a
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -18,6 +19,7 @@ from gcsplan.app.check.files import check_batch, failing_of, home_lines
 from gcsplan.app.check.worlds import Checked, Returns, split_name
 from gcsplan.check.returns.words import verdict_words
 from gcsplan.check.verdict import Verdict
+from gcsplan.dem.dat_file import DAT_SUFFIX
 from gcsplan.errors import Cancelled, GcsplanError, InputError, Mistake
 from gcsplan.mavlink.files.file_items import HAS_PLACE, MissionFileRead
 from gcsplan.mavlink.files.formats import read_mission_file
@@ -35,7 +37,7 @@ from gcsplan.mission_file.zones.draft import ZoneDraft, zone_notes
 from gcsplan.notes.note import Note, Wording
 from gcsplan.page.answers import MOST_ON_PAGE, PROFILE_SAMPLES, flown_line, mistakes_text, profile_of, verdict_word
 from gcsplan.page.dropped.route import FileRoute, route_of
-from gcsplan.page.dropped.shelf import Dropped, Shelf, has_other, may_be_zones, place_in
+from gcsplan.page.dropped.shelf import Dropped, Shelf, ending_of, has_other, laid_out, may_be_zones, place_in
 from gcsplan.page.edits import Edits
 from gcsplan.page.ground_tiles import bounds_of
 from gcsplan.page.places import vehicles_of
@@ -45,6 +47,7 @@ from gcsplan.report.parts.track_samples import TrackLine, line_of
 from gcsplan.units import METRIC, Units
 from gcsplan.vehicle import Autopilot
 from gcsplan.world.geodesy.frame import Frame
+from gcsplan.world.geodesy.height_unit import METRE
 from gcsplan.world.terrain.raster import open_raster
 
 MOST_DRAWN = 2000
@@ -72,8 +75,9 @@ class DroppedFile:
     def look(self, message: FileMessage, units: Units) -> FileAnswer:
         """The answer on the file: its kind, its content, its mistakes. Raises PageError where there is no file."""
         dropped = self._held(message)
-        answer: FileAnswer = {"name": dropped.name, "kind": dropped.kind, "bytes": len(dropped.data), "error": ""}
-        answer["there"] = has_other(self._edits.store.folder / dropped.name, dropped.data)
+        size = sum(len(one.data) for one in dropped.all)
+        answer: FileAnswer = {"name": dropped.name, "kind": dropped.kind, "bytes": size, "error": ""}
+        answer["there"] = bool(self._there(dropped))
         look = {"mission": self._mission, "zones": self._zones, "ground": self._ground}[dropped.kind]
         try:
             answer |= look(dropped, message, units)
@@ -208,24 +212,46 @@ class DroppedFile:
     def _section(self, dropped: Dropped, message: FileMessage) -> dict[str, Any]:
         now = self._edits.document.get("terrain")
         stays = {key: now[key] for key in GROUND_STAYS if isinstance(now, dict) and key in now}
-        return {"dem": dropped.name, **_settings(message, GROUND_SETTINGS), **stays}
+        names = dropped.rasters
+        if not names:
+            raise InputError("this belongs to a raster: drop it together with that", where=dropped.name)
+        return {"dem": names if len(names) > 1 else names[0], **_settings(message, GROUND_SETTINGS), **stays}
 
     def _ground(self, dropped: Dropped, message: FileMessage, units: Units) -> FileAnswer:
         problems: list[Mistake] = []
         section = self._section(dropped, message)
+        if "canopy" in section:  # a file of the mission's folder
+            section["canopy"] = str(self._edits.store.folder / str(section["canopy"]))
         keys = read_section(TerrainKeys, section, "terrain", problems)
         if keys is None or problems:
             raise InputError.of(problems)
-        raster = open_raster(
-            Path(dropped.name), where="terrain.dem", crs=keys.crs, height_unit=keys.height_unit, data=dropped.data
-        )
-        terrain = opened(make_spec(keys, self._edits.store.folder, {dropped.name: dropped.data}), where="terrain")
+        with laid_out(dropped) as folder:
+            try:
+                return self._ground_in(folder, dropped, keys, units)
+            except InputError as why:
+                raise InputError(words_of(why).replace(f"{folder}{os.sep}", "")) from None
+
+    def _ground_in(self, folder: Path, dropped: Dropped, keys: TerrainKeys, units: Units) -> FileAnswer:
+        terrain = opened(make_spec(keys, folder), where="terrain")
+        of_vehicles = [name for name in dropped.rasters if ending_of(name) == DAT_SUFFIX.lower()]  # no rasters
+        rasters = [
+            open_raster(folder / name, where="terrain.dem", crs=keys.crs, height_unit=keys.height_unit)
+            for name in dropped.rasters if name not in of_vehicles
+        ]  # fmt: skip
+        outside = [file for raster in rasters for file in raster.files if file.resolve().parent != folder]
+        if outside:
+            words = f"names {outside[0].name}, which was not dropped: drop it together with all files that it names"
+            raise InputError(words, where=dropped.name)
         places = [p for v in vehicles_of(self._edits.document, None) for p in (v["start"], v["goal"], *v["via"]) if p]
         inside = np.asarray(terrain.covers(*np.array(places).T)) if places else np.zeros(0, bool)
+        stated = {raster.vertical.name for raster in rasters if raster.vertical is not None}
         return {
-            "bounds": bounds_of(terrain), "cells": [raster.cols, raster.rows], "height_unit": raster.unit.name,
-            "vertical_datum": keys.vertical_datum or (raster.vertical.name if raster.vertical is not None else None),
-            "notes": _texts(raster.notes, Wording(units)), "places": len(places), "beside": int((~inside).sum()),
+            "bounds": bounds_of(terrain), "files": [one.name for one in dropped.all],
+            "cells": [[raster.cols, raster.rows] for raster in rasters][:MOST_ON_PAGE],
+            "height_unit": ", ".join(sorted({raster.unit.name for raster in rasters})) or METRE.name,
+            "vertical_datum": keys.vertical_datum or ", ".join(sorted(stated)) or None,
+            "notes": _texts([note for raster in rasters for note in raster.notes], Wording(units)),
+            "places": len(places), "beside": int((~inside).sum()),
         }  # fmt: skip
 
     def _take_ground(self, dropped: Dropped, message: FileMessage) -> None:
@@ -236,13 +262,18 @@ class DroppedFile:
 
     def _write(self, dropped: Dropped, message: FileMessage) -> None:
         """Write the file into the mission's folder; another one of its name only with the user's word."""
-        target = self._edits.store.folder / dropped.name
-        if has_other(target, dropped.data) and message.get("over") is not True:
-            words = f"another {dropped.name} lies in the folder of the mission: replace it, or rename the file"
+        there = self._there(dropped)
+        if there and message.get("over") is not True:
+            words = f"another {there[0]} lies in the folder of the mission: replace it, or rename the file"
             raise PageError(words, code="file_exists", where="dropped")
         place_in(self._edits.store.folder, dropped)
         if self._edits.planner is not None:
             self._edits.planner.reload()  # what it read of an older file of this name does not count
+
+
+    def _there(self, dropped: Dropped) -> list[str]:
+        """The names of which the mission's folder has another file."""
+        return [one.name for one in dropped.all if has_other(self._edits.store.folder / one.name, one.data)]
 
 
 def words_of(why: GcsplanError) -> str:

@@ -186,7 +186,9 @@ class MapServer:
         """Take the bytes of a dropped file, no more than one of its kind may have; nothing of it is read here."""
         size = request.headers.get("content-length", "")
         try:
-            coming = self._session.shelf.receive(request.path_params["name"], int(size) if size.isdigit() else None)
+            bytes_ = int(size) if size.isdigit() else None
+            more = request.query_params.get("more") == "yes"
+            coming = self._session.shelf.receive(request.path_params["name"], bytes_, more=more)
             async for part in request.stream():
                 coming.add(part)
             held = self._session.shelf.put(coming)

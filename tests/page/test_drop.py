@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import rasterio
+import rasterio.shutil
 
 from gcsplan.app.check.files import check_batch, finding_lines
 from gcsplan.app.fleet.pipeline import load_mission
@@ -36,6 +37,28 @@ def drop(desk: Desk, name: str, data: bytes, **more: Any) -> dict[str, Any]:
     coming.add(data)
     desk.session.shelf.put(coming)
     return desk.ask("inspect", "dropped", **more)
+
+
+def drop_all(desk: Desk, files: dict[str, bytes], **more: Any) -> dict[str, Any]:
+    """What the page is told of files that are dropped together."""
+    for k, (name, data) in enumerate(files.items()):
+        coming = desk.session.shelf.receive(name, len(data), more=k > 0)
+        coming.add(data)
+        desk.session.shelf.put(coming)
+    return desk.ask("inspect", "dropped", **more)
+
+
+def raster(driver: str, west: float = 8.48, north: float = 46.53, *, cells: int = 40, step: float = 0.001) -> bytes:
+    """A raster over the field, in a format of GDAL."""
+    with rasterio.MemoryFile() as memory:
+        with memory.open(driver="GTiff", width=cells, height=cells, count=1, dtype="int16", crs="EPSG:4326",
+                         transform=rasterio.Affine(step, 0.0, west, 0.0, -step, north)) as made:  # fmt: skip
+            made.write(np.full((1, cells, cells), 120, np.int16))
+        if driver == "GTiff":
+            return memory.read()
+        with memory.open() as source, rasterio.MemoryFile() as target:
+            rasterio.shutil.copy(source, target.name, driver=driver)
+            return target.read()
 
 
 def refusal(desk: Desk, kind: str, **more: Any) -> dict[str, Any]:
@@ -137,7 +160,7 @@ def test_a_raster_becomes_the_ground_with_the_datum_that_it_needs(desk: Desk, fi
         data = memory.read()
     assert "vertical_datum" in drop(desk, "dem.tif", data)["error"]
     found = desk.ask("inspect", "dropped", settings={"vertical_datum": "EGM96"})
-    assert (found["error"], found["cells"], found["places"], found["beside"]) == ("", [40, 40], 2, 0)
+    assert (found["error"], found["cells"], found["places"], found["beside"]) == ("", [[40, 40]], 2, 0)
     assert found["bounds"] == pytest.approx([8.48, 46.49, 8.52, 46.53], abs=1e-3)
     state = desk.ask("take", "state", settings={"vertical_datum": "EGM96"})
     assert "dem.tif" in state["files"]
@@ -197,3 +220,52 @@ def test_a_required_return_counts_in_the_verdict_on_a_file(desk: Desk) -> None:
     desk.ask("change", "state", changes={"way_home": "required"})
     found = desk.ask("inspect", "dropped")
     assert (found["verdict"], found["passes"], found["return_safe"]) == ("violations", False, False)
+
+
+DATUM = {"settings": {"vertical_datum": "EGM96"}}
+
+
+@pytest.mark.slow
+def test_ground_of_every_format_is_read_as_the_mission_reads_it_and_taken_whole(desk: Desk, file: Path) -> None:
+    asc = raster("AAIGrid")
+    assert "crs" in drop(desk, "a.asc", asc, **DATUM)["error"]
+    prj = rasterio.crs.CRS.from_epsg(4326).to_wkt().encode()
+    found = drop_all(desk, {"a.asc": asc, "a.prj": prj}, **DATUM)
+    assert (found["error"], found["cells"], found["files"], found["beside"]) == ("", [[40, 40]], ["a.asc", "a.prj"], 0)
+    desk.ask("take", "state", **DATUM)
+    assert ((file.parent / "a.asc").read_bytes(), (file.parent / "a.prj").read_bytes()) == (asc, prj)
+    for name, data in (("N46E008.hgt", np.full(1201**2, 120, ">i2").tobytes()), ("a.img", raster("HFA")),
+                       ("a.xyz", raster("XYZ")), ("n46.dt1", raster("DTED", 8.0 - 0.5 / 1200, 47.0 + 0.5 / 1200, cells=1201, step=1 / 1200))):
+        found = drop(desk, name, data, settings={"vertical_datum": "EGM96", "crs": "EPSG:4326"})
+        assert (found["error"], found["beside"]) == ("", 0), name
+    tiles = {"west.tif": raster("GTiff", 8.46), "east.tif": raster("GTiff", 8.50)}
+    found = drop_all(desk, tiles, **DATUM)
+    assert (found["error"], len(found["cells"]), found["bounds"][0], found["beside"]) == ("", 2, pytest.approx(8.46, abs=1e-3), 0)
+    desk.ask("take", "state", **DATUM)
+    assert "dem: [west.tif, east.tif]" in desk.ask("text", "text")["text"]
+
+
+VRT = """<VRTDataset rasterXSize="40" rasterYSize="40"><SRS>EPSG:4326</SRS>
+<GeoTransform>8.48, 0.001, 0, 46.53, 0, -0.001</GeoTransform><VRTRasterBand dataType="Int16" band="1"><SimpleSource>
+<SourceFilename relativeToVRT="RELATIVE">NAME</SourceFilename><SourceBand>1</SourceBand>
+<SrcRect xOff="0" yOff="0" xSize="40" ySize="40"/><DstRect xOff="0" yOff="0" xSize="40" ySize="40"/></SimpleSource>
+</VRTRasterBand></VRTDataset>"""
+
+
+@pytest.mark.slow
+def test_a_vrt_puts_together_what_was_dropped_with_it_and_nothing_else(desk: Desk, file: Path) -> None:
+    tile = raster("GTiff")
+    (file.parent / "other.tif").write_bytes(tile)
+    whole = VRT.replace("RELATIVE", "1").replace("NAME", "tile.tif").encode()
+    assert drop_all(desk, {"all.vrt": whole, "tile.tif": tile}, **DATUM)["error"] == ""
+    assert "not there" in drop(desk, "all.vrt", whole, **DATUM)["error"]
+    for name in (str(file.parent / "other.tif"), "/vsicurl/http://127.0.0.1:1/x.tif", "/etc/passwd"):
+        found = drop(desk, "all.vrt", VRT.replace("RELATIVE", "0").replace("NAME", name).encode(), **DATUM)
+        assert found["error"], name
+        assert "gcsplan-" not in found["error"]  # no folder of this machine
+    for bad in ("a.prj", "a.asc", "N46E008.hgt", "a.dt2", "a.img", "a.nc", "a.xyz", "N46E008.DAT", "a.vrt"):
+        found = drop(desk, bad, b"not a raster" * 50, **DATUM)
+        assert len(found["error"]) > 20, bad
+        assert "gcsplan-" not in found["error"], found["error"]
+        assert refusal(desk, "take", **DATUM)["code"] == "bad_file"
+        assert not (file.parent / bad).exists()

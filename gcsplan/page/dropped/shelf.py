@@ -1,14 +1,18 @@
-"""`Shelf`: the one file that was dropped on the page, in memory until the user takes it or drops another.
+"""`Shelf`: the file that was dropped on the page, in memory until the user takes it or drops another.
 
 A dropped file is a stranger's: its bytes are bounded by its ending before any is read, and its name has no folder.
+Rasters may be several: tiles side by side, a .vrt with what it puts together, and the files beside them (.prj, …).
 """
 
 from __future__ import annotations
 
 import os
 import re
+import tempfile
 import threading
-from dataclasses import dataclass
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -29,10 +33,14 @@ from gcsplan.world.terrain.input_files import (
 
 DroppedKind = Literal["mission", "zones", "ground"]
 
-GEOTIFF = (".tif", ".tiff")
-"""Terrain that is read out of memory; all other kinds have to lie in a folder."""
+BESIDE = (".prj", ".aux.xml", ".tfw", ".wld", ".hdr", ".ovr", ".msk", ".ige", ".rrd")
+"""Endings of files beside a raster, which GDAL finds by its name."""
 
-MOST_GROUND_BYTES = 128 * 2**20
+GROUND = (*TERRAIN_FILES, *BESIDE)
+
+MOST_GROUND_BYTES, MOST_TOGETHER_BYTES, MOST_TOGETHER = 128 * 2**20, 256 * 2**20, 64
+"""Most bytes of a raster, and most bytes and number of all that are dropped together."""
+
 MOST_NAME = 96
 
 _WAYPOINTS = b"QGC WPL"
@@ -41,11 +49,26 @@ _WAYPOINTS = b"QGC WPL"
 
 @dataclass(frozen=True, slots=True)
 class Dropped:
-    """A file: its ``name`` without a folder, its kind by name and first bytes, and its content."""
+    """A file: its ``name`` without a folder, its kind by name and first bytes, and its content.
+
+    ``more``: the files that were dropped together with it, all of them of ground.
+    """
 
     name: str
     kind: DroppedKind
     data: bytes
+    more: tuple[Dropped, ...] = ()
+
+    @property
+    def all(self) -> tuple[Dropped, ...]:
+        """This file and the others."""
+        return (self, *self.more)
+
+    @property
+    def rasters(self) -> list[str]:
+        """The names that ``terrain.dem`` has of ground: a .vrt stands for what it puts together."""
+        names = [one.name for one in self.all if ending_of(one.name) not in BESIDE]
+        return [name for name in names if ending_of(name) == ".vrt"] or names
 
 
 def endings() -> dict[str, int]:
@@ -54,8 +77,13 @@ def endings() -> dict[str, int]:
     return {
         **dict.fromkeys(zones, MAX_ZONE_BYTES),
         **dict.fromkeys(VEHICLE_FILES, MAX_FILE_BYTES),
-        **dict.fromkeys(GEOTIFF, MOST_GROUND_BYTES),
+        **dict.fromkeys(GROUND, MOST_GROUND_BYTES),
     }
+
+
+def ending_of(name: str) -> str:
+    """The ending of a file's name in lower case, with both parts of ``.aux.xml``."""
+    return ".aux.xml" if name.lower().endswith(".aux.xml") else Path(name).suffix.lower()
 
 
 def may_be_zones(name: str) -> bool:
@@ -72,13 +100,11 @@ def safe_name(given: str) -> str:
 
 def most_bytes(name: str) -> int:
     """The most bytes of a file of this name. Raises InputError for an ending that is not read here, with a cure."""
-    ending = Path(name).suffix.lower()
+    ending = ending_of(name)
     found = endings().get(ending)
     if found is not None:
         return found
     other = {
-        **dict.fromkeys(TERRAIN_FILES, "of terrain only GeoTIFF is read here; copy this file into the folder of the "
-                        "mission, and it is offered as ground"),
         **dict.fromkeys(MISSION_FILES, "this is a mission file: open it with gcsplan map, or paste its text as YAML"),
         **dict.fromkeys(LOG_FILES, "this is a flight log: gcsplan fit-energy reads it"),
     }.get(ending, f"files that end so are not read; drop {', '.join(endings())}")  # fmt: skip
@@ -86,10 +112,13 @@ def most_bytes(name: str) -> int:
 
 
 class Receiving:
-    """The bytes of one file as they come; `add` raises InputError for more than its kind may have."""
+    """The bytes of one file as they come; `add` raises InputError for more than its kind may have.
 
-    def __init__(self, shelf: Shelf, name: str, most: int) -> None:
-        self._shelf, self.name, self._most = shelf, name, most
+    ``behind``: the files that were dropped before it and belong to it.
+    """
+
+    def __init__(self, shelf: Shelf, name: str, most: int, behind: Dropped | None = None) -> None:
+        self._shelf, self.name, self._most, self.behind = shelf, name, most, behind
         self.data = bytearray()
 
     def add(self, part: bytes) -> None:
@@ -102,21 +131,29 @@ class Receiving:
 
 
 class Shelf:
-    """Holds the newest file; may be used from any thread."""
+    """Holds the newest file, or files of ground; may be used from any thread."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._coming: Receiving | None = None
         self._held: Dropped | None = None
 
-    def receive(self, name: str, size: int | None) -> Receiving:
-        """Begin with a file of ``size`` bytes (None: unknown), which supersedes any other. Raises InputError."""
+    def receive(self, name: str, size: int | None, *, more: bool = False) -> Receiving:
+        """Begin with a file of ``size`` bytes (None: unknown), which supersedes any other, or, as one ``more``, joins
+        those of ground that are there. Raises InputError."""
         own = safe_name(name)
+        behind = self.held if more else None
         most = most_bytes(own)
+        if behind is not None:
+            if not behind.kind == _kind_of(own, b"") == "ground":
+                raise InputError("only files of ground are dropped together: drop this one alone", where=own)
+            if len(behind.all) >= MOST_TOGETHER or own in (one.name for one in behind.all):
+                raise InputError(f"{MOST_TOGETHER} files of different names are the most: drop fewer", where=own)
+            most = min(most, MOST_TOGETHER_BYTES - sum(len(one.data) for one in behind.all))
         if size is not None and size > most:
             raise InputError(f"the file has {size} bytes, more than {most}: simplify or split it", where=own)
         with self._lock:
-            self._held, self._coming = None, Receiving(self, own, most)
+            self._held, self._coming = None, Receiving(self, own, most, behind)
             return self._coming
 
     def expects(self, coming: Receiving) -> bool:
@@ -126,13 +163,13 @@ class Shelf:
 
     def put(self, whole: Receiving) -> Dropped:
         """Keep a file that has come whole. Raises InputError."""
-        data, ending = bytes(whole.data), Path(whole.name).suffix.lower()
-        mission = ending in VEHICLE_FILES or data.removeprefix(b"\xef\xbb\xbf").startswith(_WAYPOINTS)
-        kind: DroppedKind = "mission" if mission else "ground" if ending in GEOTIFF else "zones"
+        data, behind = bytes(whole.data), whole.behind
+        one = Dropped(whole.name, _kind_of(whole.name, data), data)
         if not self.expects(whole):
             raise InputError("another file was dropped meanwhile: drop this one again", where=whole.name)
         with self._lock:
-            self._held, self._coming = Dropped(whole.name, kind, data), None
+            self._held = one if behind is None else replace(behind, more=(*behind.more, one))
+            self._coming = None
             return self._held
 
     @property
@@ -149,6 +186,23 @@ class Shelf:
             self._held = self._coming = None
 
 
+def _kind_of(name: str, data: bytes) -> DroppedKind:
+    ending = ending_of(name)
+    if ending in VEHICLE_FILES or data.removeprefix(b"\xef\xbb\xbf").startswith(_WAYPOINTS):
+        return "mission"
+    return "ground" if ending in GROUND else "zones"
+
+
+@contextmanager
+def laid_out(dropped: Dropped) -> Iterator[Path]:
+    """A folder of our own with the files, for readers that find one by the name of another; it goes at the end."""
+    with tempfile.TemporaryDirectory(prefix="gcsplan-") as made:
+        folder = Path(made).resolve()
+        for one in dropped.all:
+            (folder / one.name).write_bytes(one.data)
+        yield folder
+
+
 def has_other(target: Path, data: bytes) -> bool:
     """Whether something else than these bytes has the name."""
     if not os.path.lexists(target):
@@ -161,11 +215,12 @@ def has_other(target: Path, data: bytes) -> bool:
         return True
 
 
-def place_in(folder: Path, dropped: Dropped) -> Path:
-    """Write a file into the folder, which the user has confirmed. Raises InputError."""
-    target = folder / dropped.name
-    if target.is_dir():
-        raise InputError("a folder has this name: rename the file, and drop it again", where=dropped.name)
-    if has_other(target, dropped.data) or not target.exists():
-        write_whole(target, dropped.data)
-    return target
+def place_in(folder: Path, dropped: Dropped) -> None:
+    """Write a file, and those that came with it, into the folder, which the user has confirmed. Raises InputError."""
+    for one in dropped.all:
+        if (folder / one.name).is_dir():
+            raise InputError("a folder has this name: rename the file, and drop it again", where=one.name)
+    for one in dropped.all:
+        target = folder / one.name
+        if has_other(target, one.data) or not target.exists():
+            write_whole(target, one.data)

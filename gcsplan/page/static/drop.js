@@ -6,11 +6,12 @@ import { banner } from './bar.js';
 import { clearFile } from './filemap.js';
 import { fileParts } from './filewords.js';
 
-let box = null, file = null, stage = '', looked = 0, settings = {}, stale = false, input = null, taken = null;
+const MOST_WAITING = 64;
+let waiting = [], uploads = 0, box = null, file = null, stage = '', looked = 0, settings = {}, stale = false, input = null, taken = null;
 
 export function startDrop() {
   box = el('section', { id: 'file', 'aria-label': 'A file' });
-  input = el('input', { id: 'file-input', type: 'file', 'aria-label': 'A file to check or to take', hidden: true, onchange: () => { if (input.files.length) upload(input.files[0]); input.value = ''; } });
+  input = el('input', { id: 'file-input', type: 'file', multiple: true, 'aria-label': 'Files to check or to take', hidden: true, onchange: () => { if (input.files.length) dropAll([...input.files]); input.value = ''; } });
   document.body.append(input);
   for (const kind of ['dragenter', 'dragover']) document.addEventListener(kind, over);
   document.addEventListener('dragleave', (event) => { if (!event.relatedTarget) document.body.classList.remove('dropping'); });
@@ -18,7 +19,7 @@ export function startDrop() {
   on('dropped', (message) => { if (message.n === looked) show(message); });
   on('state', state);
   on('error', refused);
-  on('connection', (now) => { if (now === 'open' && file) close(); }); // a new server has no file
+  on('connection', (now) => { if (now === 'open' && file) { waiting = []; close(); } }); // a new server has no file
   idle();
 }
 
@@ -36,29 +37,47 @@ function dropped(event) {
   event.preventDefault();
   document.body.classList.remove('dropping');
   const { files } = event.dataTransfer;
-  if (files.length > 1) { banner('file', 'One file at a time: drop them one after the other.', [], 'warn', 8000); return; }
-  if (files.length) upload(files[0]);
+  if (files.length) dropAll([...files]);
 }
 
 // -- sending ----------------------------------------------------------------------------------------------------------
 
-async function upload(chosen) {
-  const ending = (/\.[^.]*$/.exec(chosen.name.toLowerCase()) || [''])[0], most = known.state?.drops[ending];
-  if (most && chosen.size > most) { banner('file', `${chosen.name} has ${chosen.size} bytes, more than ${most}: simplify or split it.`, [], 'bad'); return; }
+const endingOf = (name) => (/(\.aux)?\.[^.]*$/.exec(name.toLowerCase()) || [''])[0];
+
+// Files of ground belong together; all others wait, and come one after the other.
+function dropAll(files) {
+  const ground = files.filter((f) => known.state?.grounds.includes(endingOf(f.name))), others = files.filter((f) => !ground.includes(f));
+  waiting = [...(ground.length ? [ground] : []), ...others.map((f) => [f])].slice(0, MOST_WAITING);
+  if (files.length > MOST_WAITING && others.length) banner('file', `${MOST_WAITING} files at a time: drop the others later.`, [], 'warn', 8000);
+  next();
+}
+
+function next() {
+  const files = waiting.shift();
+  if (files) upload(files);
+}
+
+async function upload(files) {
+  const mine = ++uploads;
   close();
   banner('file', '');
-  waitFor(chosen.name);
-  let answer = null;
-  try {
-    const sent = most ? chosen : chosen.slice(0, 0); // the server says why it takes no such file
-    const response = await fetch(`dropped/${encodeURIComponent(chosen.name.slice(-200))}`, { method: 'PUT', body: sent });
-    if (!response.ok) throw new Error(`${chosen.name} was not taken (${response.status}): drop it again.`);
-    answer = await response.json();
-    if (answer.error) throw new Error(answer.error);
-  } catch (error) {
-    close();
-    banner('file', error instanceof TypeError ? `${chosen.name} cannot be sent: is it a folder, has it changed, or has gcsplan ended?` : error.message, [], 'bad');
-    return;
+  for (const [k, chosen] of files.entries()) {
+    const most = known.state?.drops[endingOf(chosen.name)];
+    waitFor(files.length > 1 ? `${chosen.name}, ${k + 1} of ${files.length}` : chosen.name);
+    try {
+      if (most && chosen.size > most) throw new Error(`${chosen.name} has ${chosen.size} bytes, more than ${most}: simplify or split it.`);
+      const sent = most ? chosen : chosen.slice(0, 0); // the server says why it takes no such file
+      const response = await fetch(`dropped/${encodeURIComponent(chosen.name.slice(-200))}${k ? '?more=yes' : ''}`, { method: 'PUT', body: sent });
+      if (!response.ok) throw new Error(`${chosen.name} was not taken (${response.status}): drop it again.`);
+      const answer = await response.json();
+      if (mine !== uploads) return; // others were dropped meanwhile
+      if (answer.error) throw new Error(answer.error);
+    } catch (error) {
+      if (mine !== uploads) return;
+      close();
+      banner('file', error instanceof TypeError ? `${chosen.name} cannot be sent: is it a folder, has it changed, or has gcsplan ended?` : error.message, waiting.length ? [button('The next file', next, { id: 'file-next' })] : [], 'bad');
+      return;
+    }
   }
   settings = {};
   look();
@@ -72,7 +91,7 @@ function look(more = {}) {
 // Takes the file into the mission as the page shows it.
 function take(more = {}) {
   const whole = { kind: file.kind, ...more };
-  if (file.kind === 'ground') known.datums[file.name] = settings.vertical_datum; // for a mission that begins on it
+  if (file.kind === 'ground') for (const name of file.files || []) known.datums[name] = settings.vertical_datum; // for a mission that begins on it
   taken = { n: step({ type: 'take', ...whole, settings }), whole };
 }
 
@@ -97,7 +116,7 @@ function redraw() {
   if (!file) { idle(); return; }
   const { name } = file;
   refill(box,
-    el('div', { class: 'heading' }, el('h2', { id: 'file-title', tabindex: -1 }, name), button('✕', close, { class: 'close', 'aria-label': `Close ${name}` })),
+    el('div', { class: 'heading' }, el('h2', { id: 'file-title', tabindex: -1 }, name), waiting.length ? button(`Next of ${waiting.length}`, next, { id: 'file-next' }) : null, button('✕', () => { close(); next(); }, { class: 'close', 'aria-label': `Close ${name}` })),
     el('p', { class: 'note', id: 'file-stale', role: 'status', hidden: !stale }, file.error ? '' : 'The mission has changed since. ', button('Check again', () => look({ kind: file.kind, vehicle: file.vehicle, as: file.as }), { id: 'file-again' })),
     ...fileParts(file, settings, { look, take }));
   byId('panel').prepend(box);
@@ -105,7 +124,7 @@ function redraw() {
 
 function idle() {
   box.replaceChildren(button('Check or add a file …', () => input.click(), { id: 'file-open', class: 'wide' }),
-    el('p', { class: 'note' }, 'Or drop it on the page: .plan, .waypoints, zones of any format, KML, GeoTIFF.'));
+    el('p', { class: 'note' }, 'Or drop it on the page: .plan, .waypoints, zones of any format, KML, terrain. Several files at once are taken in turn; tiles of terrain together.'));
 }
 
 function close() {
@@ -119,7 +138,7 @@ function close() {
 function state(now) {
   const panel = byId('panel');
   if (!panel.contains(box)) { if (file) panel.prepend(box); else panel.append(box); }
-  if (taken && file && now.n >= taken.n) { taken = null; close(); return; }
+  if (taken && file && now.n >= taken.n) { taken = null; close(); next(); return; }
   if (file && stage !== now.stage) redraw();
   if (file && now.n > looked && !stale) {
     stale = file.kind === 'mission';

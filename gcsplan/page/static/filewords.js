@@ -95,7 +95,7 @@ function zoneSettings(file, settings, act) {
 function ground(file, settings, act) {
   if (file.bounds) drawBounds(file.bounds);
   const again = () => act.look({ settings: { vertical_datum: byId('file-datum').value.trim(), height_unit: byId('file-unit').value, crs: byId('file-crs').value.trim() } });
-  const rows = file.cells ? [['Cells', `${file.cells[0]} × ${file.cells[1]}`], ['Heights', `${file.height_unit}, above ${file.vertical_datum || 'an unnamed zero'}`],
+  const rows = file.files ? [...(file.files.length > 1 ? [['Files', file.files.join(', ')]] : []), ...(file.cells.length ? [['Cells', file.cells.map(([cols, rows_]) => `${cols} × ${rows_}`).join(', ')]] : []), ['Heights', `${file.height_unit}, above ${file.vertical_datum || 'an unnamed zero'}`],
     ...(file.places ? [['The mission', file.beside ? `${many(file.beside, 'place lies', 'places lie')} beside it` : 'lies on it']] : [])] : [];
   return [
     problem(file),

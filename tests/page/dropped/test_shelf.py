@@ -8,7 +8,7 @@ import pytest
 
 from gcsplan.errors import InputError
 from gcsplan.mavlink.files.file_items import MAX_FILE_BYTES
-from gcsplan.page.dropped.shelf import Dropped, Shelf, endings, has_other, most_bytes, place_in, safe_name
+from gcsplan.page.dropped.shelf import Dropped, Shelf, endings, has_other, laid_out, most_bytes, place_in, safe_name
 
 
 @pytest.mark.parametrize(
@@ -21,7 +21,7 @@ def test_a_name_has_no_folder_and_plain_letters(given: str, name: str) -> None:
     assert safe_name(given) == name
 
 
-@pytest.mark.parametrize("name", ["dem.vrt", "field.yaml", "run.sh", "log.bin", "zones", ".kml"])
+@pytest.mark.parametrize("name", ["field.yaml", "run.sh", "log.bin", "zones", ".kml"])
 def test_a_file_of_another_kind_is_refused_with_a_cure_before_its_bytes(name: str) -> None:
     with pytest.raises(InputError) as why:
         Shelf().receive(name, 10)
@@ -60,7 +60,7 @@ def test_a_newer_file_supersedes_one_that_is_still_coming() -> None:
 @pytest.mark.parametrize(
     ("name", "data", "kind"),
     [("a.plan", b"{}", "mission"), ("a.txt", b"\xef\xbb\xbfQGC WPL 110\n", "mission"), ("a.txt", b"AC D\n", "zones"),
-     ("a.json", b"{}", "zones"), ("a.TIF", b"II*\0", "ground")],
+     ("a.json", b"{}", "zones"), ("a.TIF", b"II*\0", "ground"), ("N46E008.hgt", b"", "ground"), ("a.tif.aux.xml", b"", "ground")],
 )  # fmt: skip
 def test_the_kind_is_known_by_name_and_first_bytes(name: str, data: bytes, kind: str) -> None:
     shelf = Shelf()
@@ -75,10 +75,29 @@ def test_a_file_is_written_into_the_folder_and_never_through_a_link(tmp_path: Pa
     outside.write_text("mine")
     (folder / "z.kml").symlink_to(outside)
     assert has_other(folder / "z.kml", b"mine")
-    assert place_in(folder, Dropped("z.kml", "zones", b"new")) == folder / "z.kml"
+    place_in(folder, Dropped("z.kml", "zones", b"new"))
     assert (outside.read_text(), (folder / "z.kml").read_text()) == ("mine", "new")
     assert not has_other(folder / "z.kml", b"new")
     assert not has_other(folder / "other.kml", b"")
     (folder / "d.kml").mkdir()
     with pytest.raises(InputError, match="folder has this name"):
         place_in(folder, Dropped("d.kml", "zones", b""))
+
+
+def test_files_of_ground_come_together_within_bounds_and_no_other_kind_joins_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("gcsplan.page.dropped.shelf.MOST_TOGETHER_BYTES", 10)
+    shelf = Shelf()
+    shelf.put(shelf.receive("a.prj", None))
+    coming = shelf.receive("a.asc", None, more=True)
+    coming.add(b"12345678")
+    held = shelf.put(coming)
+    assert ([one.name for one in held.all], held.rasters) == (["a.prj", "a.asc"], ["a.asc"])
+    for name, size, words in (("b.asc", 3, "more than 2"), ("a.asc", 1, "different names"), ("z.kml", 1, "alone")):
+        with pytest.raises(InputError, match=words):
+            shelf.receive(name, size, more=True)
+    shelf.put(shelf.receive("all.vrt", 0, more=True))
+    assert shelf.held.rasters == ["all.vrt"]
+    with laid_out(shelf.held) as folder:
+        assert sorted(file.name for file in folder.iterdir()) == ["a.asc", "a.prj", "all.vrt"]
+        assert folder.stat().st_mode & 0o077 == 0
+    assert not folder.exists()
