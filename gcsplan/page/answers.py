@@ -30,6 +30,9 @@ from gcsplan.world.geodesy.frame import Frame
 PROFILE_SAMPLES = 400
 """Samples of a profile; a few more if there are many legs."""
 
+MOST_PROFILES = 12
+"""Of a plan with more vehicles than this the chosen one's profile alone is sent: the page draws one at a time."""
+
 MOST_ON_PAGE = 50
 """Most findings and most notes of one vehicle."""
 
@@ -51,8 +54,10 @@ def bound_answer(n: int, vehicle: int, bound: float, cost: float | None) -> dict
     return {"type": "bound", "n": n, "vehicle": vehicle, "bound": bound, "gap_percent": gap_percent(cost, bound)}
 
 
-def plan_answer(n: int, plan: Plan, homes: Mapping[str, WayHome], units: Units, elapsed_s: float) -> dict[str, Any]:
-    """The judged mission: the certificate of each vehicle, its figures, its profile."""
+def plan_answer(
+    n: int, plan: Plan, homes: Mapping[str, WayHome], units: Units, elapsed_s: float, chosen: int = 0
+) -> dict[str, Any]:
+    """The judged mission: the certificate of each vehicle, its figures, its profile (of many, the ``chosen`` one's)."""
     wording = Wording(units)
     verdicts = [_flies(v, plan, homes.get(v.name)) for v in plan.vehicles]
     safe = False if False in verdicts else None if None in verdicts or plan.left_out else True
@@ -60,7 +65,11 @@ def plan_answer(n: int, plan: Plan, homes: Mapping[str, WayHome], units: Units, 
     return {
         "type": "plan", "n": n, "verdict": verdict_word(safe), "headline": _headline(plan, homes, wording),
         "elapsed_ms": round(elapsed_s * 1e3, 1),
-        "vehicles": [_vehicle(numbers[v.name], v, plan, homes.get(v.name), units) for v in plan.vehicles],
+        "vehicles": [
+            _vehicle(k, v, plan, homes.get(v.name), units,
+                     with_profile=k == chosen or len(plan.vehicles) <= MOST_PROFILES)
+            for v in plan.vehicles for k in (numbers[v.name],)
+        ],
         "fleet": time_table(plan, units),
         "left_out": [{"name": left.name, "message": left.message} for left in plan.left_out],
         "notes": notes[:MOST_ON_PAGE],
@@ -85,9 +94,25 @@ def _headline(plan: Plan, homes: Mapping[str, WayHome], wording: Wording) -> str
     return words[0][1] if len(words) == 1 else "; ".join(f"{name}: {text}" for name, text in words[:MOST_ON_PAGE])
 
 
-def _vehicle(number: int, v: VehiclePlan, plan: Plan, home: WayHome | None, units: Units) -> dict[str, Any]:
+def profile_answer(n: int, plan: Plan, vehicle: int) -> dict[str, Any] | None:
+    """The profile of one vehicle of many, once it is chosen; None if it came with the plan, or does not fly."""
+    v = next((v for v in plan.vehicles if numbers_of(plan)[v.name] == vehicle), None)
+    if v is None or len(plan.vehicles) <= MOST_PROFILES:
+        return None
+    line = _line_of(v, plan)
+    profile = None if line is None else profile_of(line, plan.world.frame)
+    return {"type": "profile", "n": n, "vehicle": vehicle, "profile": profile}
+
+
+def _line_of(v: VehiclePlan, plan: Plan) -> TrackLine | None:
+    return line_of(v.verdict, plan.world, v.request.vehicle.limits, samples=PROFILE_SAMPLES)
+
+
+def _vehicle(
+    number: int, v: VehiclePlan, plan: Plan, home: WayHome | None, units: Units, *, with_profile: bool
+) -> dict[str, Any]:
     wording, verdict = Wording(units), v.verdict
-    line = line_of(verdict, plan.world, v.request.vehicle.limits, samples=PROFILE_SAMPLES)
+    line = _line_of(v, plan) if with_profile or home is not None else None
     notes = [note.text(wording) for note in v.all_notes(plan.fleet)]
     return {
         "vehicle": number, "name": v.name, "verdict": verdict_word(_flies(v, plan, home)), "line": flown_line(verdict),
@@ -95,7 +120,7 @@ def _vehicle(number: int, v: VehiclePlan, plan: Plan, home: WayHome | None, unit
         "time_s": verdict.time_s, "energy_j": verdict.reported_j(verdict.energy_j),
         "figures": figures(v, home, units),
         "way_home": None if home is None or line is None else _way_home(home, line, plan.world.frame, wording),
-        "profile": None if line is None else profile_of(line, plan.world.frame),
+        "profile": profile_of(line, plan.world.frame) if with_profile and line is not None else None,
         "findings": [f.note.text(wording) for f in verdict.findings[:MOST_ON_PAGE]],
         "not_judged": [note.text(wording) for note in verdict.not_judged[:MOST_ON_PAGE]],
         "notes": notes[:MOST_ON_PAGE],
@@ -106,7 +131,7 @@ def home_answer(n: int, plan: Plan, homes: Mapping[str, WayHome], units: Units) 
     """The way home of each vehicle, which takes longer than its plan."""
     wording, vehicles, numbers = Wording(units), [], numbers_of(plan)
     for v in plan.vehicles:
-        line = line_of(v.verdict, plan.world, v.request.vehicle.limits, samples=PROFILE_SAMPLES)
+        line = _line_of(v, plan)
         home = homes.get(v.name)
         if home is None or line is None:
             continue

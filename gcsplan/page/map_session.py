@@ -295,6 +295,9 @@ class MapSession:
         elif kind == "vehicle":
             self._vehicle = _number(message.get("vehicle"))
             self._send_state()
+            profile = None if self._last is None else answers.profile_answer(self._n, self._last, self._vehicle)
+            if profile is not None:
+                self._send(profile)
         elif kind == "scene":
             self._shows_scene = message.get("on") is True
             self._send_scene()
@@ -394,7 +397,8 @@ class MapSession:
         """Send the certificate, then the way home, which is judged before it if the mission requires a safe one."""
         required = is_required(plan.source, option=False)
         homes = homes_of(plan) if required else {}
-        self._send(answers.plan_answer(n, plan, homes, self._units, elapsed_s) | {"plan": self.steps.show(plan)})
+        answer = answers.plan_answer(n, plan, homes, self._units, elapsed_s, self._vehicle)
+        self._send(answer | {"plan": self.steps.show(plan)})
         self._send_scene()
         self._homeless = None if required else (n, plan)
         self._send_home()

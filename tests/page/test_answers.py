@@ -96,3 +96,18 @@ def test_an_error_names_the_key_without_the_file() -> None:
     why = InputError.of([Mistake("/a/b.yaml: limits.min_agl_m", "must be"), Mistake("/a/b.yaml: name", "must not")])
     found = answers.error_answer(1, why, "bad_mission")
     assert (found["where"], found["message"]) == ("limits.min_agl_m", "limits.min_agl_m: must be\nname: must not")
+
+
+def test_of_many_vehicles_the_profile_of_the_chosen_one_alone_is_sent(monkeypatch: pytest.MonkeyPatch) -> None:
+    second = {**MISSION["vehicles"][0], "name": "uav2", "sysid": 2, "start": [46.5, 8.52], "goal": [46.51, 8.52]}
+    planned = plan({**MISSION, "vehicles": [*MISSION["vehicles"], second]})
+    both = answers.plan_answer(1, planned, {}, METRIC, 0.0, 1)["vehicles"]
+    assert answers.profile_answer(2, planned, 0) is None  # it came with the plan
+    monkeypatch.setattr("gcsplan.page.answers.MOST_PROFILES", 1)
+    found = answers.plan_answer(1, planned, {}, METRIC, 0.0, 1)["vehicles"]
+    assert [v["profile"] for v in found] == [None, both[1]["profile"]]
+    later = answers.profile_answer(2, planned, 0)
+    assert later is not None
+    assert (later["vehicle"], later["profile"]) == (0, both[0]["profile"])
+    assert answers.profile_answer(2, planned, 2) is None
+    assert len(json.dumps(found)) < 0.6 * len(json.dumps(both))

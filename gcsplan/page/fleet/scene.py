@@ -11,14 +11,15 @@ from gcsplan.report.parts.page_data import in_full, samples_of
 from gcsplan.report.views.space import drawn, space_data
 from gcsplan.units import Units
 
-SCENE_SAMPLES = 300
-"""Most samples of one line; a few more if it has many legs."""
+SCENE_SAMPLES, SCENE_SAMPLES_IN_ALL, LEAST_SAMPLES = 300, 3600, 24
+"""Most samples of one line, of all together, and of one of very many; a few more if lines have many legs."""
 
 
 def scene_answer(n: int, plan: Plan, units: Units) -> dict[str, Any]:
     """The ground, the zones, the lines and the replay of a plan; vehicles have their numbers in the mission file."""
     page, numbers = page_of_plan(plan, units=units), numbers_of(plan)
-    seen = drawn(page, [min(samples, SCENE_SAMPLES) for samples in samples_of(page, in_full(page))])
+    most = min(SCENE_SAMPLES, max(LEAST_SAMPLES, SCENE_SAMPLES_IN_ALL // len(plan.vehicles)))
+    seen = drawn(page, [min(samples, most) for samples in samples_of(page, in_full(page))])
     data: dict[str, Any] = space_data(page, seen)
     for line in data["lines"]:
         line["index"] = numbers[line["name"]]

@@ -10,6 +10,7 @@ import { addMode, enter, leave } from './modes.js';
 const FIRST_RULE = { 'arrival.mode': 'sequence', 'arrival.interval_s': 30, 'arrival.separation_m': 30 };
 const MODES = [['', 'no rule: nothing keeps them apart'], ['sequence', 'one after the other'], ['together', 'all at the same time'], ['none', 'each as soon as it can']];
 const WAITS = [['ground', 'on the ground'], ['gate', 'in the air, at its first point'], ['none', 'nowhere']];
+export const MOST_SHOWN = 12; // of more vehicles than this, the chosen one alone has points that are dragged
 let box = null, begun = null, open = false;
 
 export const many = () => Boolean(known.state) && known.state.vehicles.length > 1;
@@ -44,7 +45,7 @@ function show() {
   if (box.querySelector('[data-dirty]')) return; // what is being typed stays
   const adding = button('Add a vehicle', () => { enter('crew-start'); canvas().focus({ preventScroll: true }); }, { id: 'vehicle-add', class: 'wide', title: 'Click its start, then its goal; it has the settings of the chosen vehicle' });
   if (!many()) { refill(box, adding); return; }
-  refill(box, el('h2', {}, 'Vehicles'), el('ul', { class: 'list crew' }, ...state.vehicles.map(row)), adding, arrivals(state));
+  refill(box, el('h2', {}, 'Vehicles'), el('ul', { class: 'list crew' }, ...state.vehicles.map(row)), state.vehicles.length > MOST_SHOWN ? el('p', { class: 'note' }, `Of ${state.vehicles.length} vehicles the chosen one alone has points and a profile; a click on a name chooses another.`) : null, adding, arrivals(state));
 }
 
 function row(v, k) {

@@ -7,10 +7,19 @@ import { pointed } from './shapes.js';
 import { holding } from './grips.js';
 
 const ALL = 10000, NEAR_PX = 14;
+const MOST_PROFILES = 12; // of more vehicles the server sends the chosen one's profile alone
 let shown = null, vehicle = -1, at = -1, flown = [], plot = null, cursor = null, range = null, own = 0;
 
 export function startProfile() {
   on('judged', draw);
+  on('profile', ({ vehicle: number, profile }) => { // of many vehicles it comes once one is chosen
+    const one = known.plan && known.plan.vehicles.find((v) => v.vehicle === number);
+    if (!one || !shown) return;
+    one.profile = profile;
+    const old = byId('below').classList.contains('old');
+    draw(known.plan);
+    byId('below').classList.toggle('old', old);
+  });
   on('file profile', draw); // a dropped file's, or the mission's again
   on('state', (state) => {
     if (state.stage !== 'mission' || !byId('below').children.length) draw(null);
@@ -31,15 +40,15 @@ function draw(plan) {
   at = -1;
   hideTip();
   pointed(null);
-  const flights = plan ? plan.vehicles.filter((v) => v.profile && v.profile.distance_m.length > 1) : [];
+  const flights = plan ? plan.vehicles.filter((v) => v.profile && v.profile.distance_m.length > 1) : [], all = plan && plan.vehicles.length > MOST_PROFILES ? plan.vehicles : flights;
   shown = null;
   if (!flights.length) { box.replaceChildren(el('p', { class: 'note' }, 'The profile along the path appears with the first mission.')); return; }
   box.classList.remove('old');
   vehicle = known.state.vehicle;
   const one = flights.find((v) => v.vehicle === vehicle) || flights[0];
   shown = one.profile;
-  const choice = flights.length > 1 ? el('select', { id: 'profile-of', 'aria-label': 'Profile of', onchange: (event) => choose(Number(event.target.value)) },
-    ...flights.map((v) => el('option', { value: v.vehicle, selected: v === one }, v.name))) : null;
+  const choice = all.length > 1 ? el('select', { id: 'profile-of', 'aria-label': 'Profile of', onchange: (event) => choose(Number(event.target.value)) },
+    ...all.map((v) => el('option', { value: v.vehicle, selected: v === one }, v.name))) : null;
   refill(box, choice, chart(shown, one.vehicle < 0 ? 't3' : toneOf(one.vehicle), one.marks || []));
   own = one.vehicle;
   showFlown();

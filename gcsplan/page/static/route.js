@@ -2,13 +2,12 @@
 import { degrees } from './dom.js';
 import { known, on } from './hub.js';
 import { addGrip, grab, holding, moveGrip, removeGrip } from './grips.js';
-import { choose, many, toneOf } from './fleet.js';
+import { MOST_SHOWN, choose, many, toneOf } from './fleet.js';
 import { change, live, step } from './link.js';
 import { canvas, frame, pixel, placeAt } from './map.js';
 import { addMode, enter, leave, modeNow } from './modes.js';
 import { lineOf } from './shapes.js';
 
-const MOST_SHOWN = 12; // of more vehicles than this, the chosen one alone has points that are dragged
 let grips = [];
 
 export function startRoute() {
