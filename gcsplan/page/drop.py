@@ -270,7 +270,6 @@ class DroppedFile:
         if self._edits.planner is not None:
             self._edits.planner.reload()  # what it read of an older file of this name does not count
 
-
     def _there(self, dropped: Dropped) -> list[str]:
         """The names of which the mission's folder has another file."""
         return [one.name for one in dropped.all if has_other(self._edits.store.folder / one.name, one.data)]

@@ -175,7 +175,9 @@ def entries_of(entry: Mapping[str, Any], value: object) -> dict[str, Any] | None
 
     None for a key that is no list of any length, has another form now, or has more than `MOST_ENTRIES`.
     """
-    form = next((f for f in _forms(entry) if f.get("type") == "array" and f.get("minItems") != f.get("maxItems", "")), None)
+    form = next(
+        (f for f in _forms(entry) if f.get("type") == "array" and f.get("minItems") != f.get("maxItems", "")), None
+    )
     if form is None or not isinstance(value, list | None) or len(value or ()) > MOST_ENTRIES:
         return None
     items = form["items"]
@@ -268,7 +270,9 @@ def arranged(document: EditedDocument, message: Mapping[str, Any]) -> dict[str, 
     if isinstance(entries, list) and type(begin) is type(end) is int and 0 <= begin < count and 0 <= end < count:
         entries.insert(end, entries.pop(begin))
         return {str(name): entries}
-    raise PageError(f"an entry of {', '.join(lists)} is moved to the place of another one", code="bad_change", where="list")
+    raise PageError(
+        f"an entry of {', '.join(lists)} is moved to the place of another one", code="bad_change", where="list"
+    )
 
 
 def require_changes(changes: object) -> Mapping[str, object]:

@@ -180,6 +180,48 @@ def test_zones_are_drawn_changed_and_deleted(hand: Hand, field: Path) -> None:
 
 
 @pytest.mark.nightly
+def test_a_button_that_is_drawn_anew_while_it_is_pressed_is_still_pressed(hand: Hand, field: Path) -> None:
+    page = hand.page
+    hand.until("!document.querySelector('#rest').innerText.includes('being judged')")  # then the panel rests
+    page.evaluate("document.querySelector('#zone-list').open = true")
+    hand.click("#zone-item-0")
+    hand.until("document.querySelector('#zone-delete')")
+    x, y = hand.at("#zone-delete")
+    hand.press(x, y)
+    field.write_text(FLAT + "# by hand\n", encoding="utf-8")  # the state that follows draws the list anew
+    hand.until("document.querySelector('.banner')?.innerText.includes('changed on disk')")
+    x, y = hand.at("#zone-delete")  # the banner takes room
+    hand.mouse("mouseMoved", x, y, down=True)
+    hand.mouse("mouseReleased", x, y)
+    hand.until("!document.querySelector('#zone-item-0')")
+    hand.judged()
+
+
+@pytest.mark.nightly
+def test_on_paper_there_is_the_whole_mission_and_no_control(hand: Hand) -> None:
+    page = hand.page
+    hand.drag([(300, 300), (200, 250), (100, 200)])  # the map is moved away
+    before = hand.at(GOAL)
+    page.ask("Emulation.setEmulatedMedia", media="print")
+    page.settle()
+    shown = (
+        "[...document.querySelectorAll('button:not(.spot):not(.point), input, dialog')].filter((e) => e.offsetParent)"
+    )
+    assert page.evaluate(f"{shown}.map((e) => e.outerHTML)") == []
+    box = page.evaluate(
+        "(({left, right, top, bottom}) => [left, right, top, bottom])(document.querySelector('#place').getBoundingClientRect())"
+    )
+    for point in (START, GOAL):
+        x, y = hand.at(point)
+        assert box[0] < x < box[1] and box[2] < y < box[3], point
+    assert page.evaluate("document.querySelector('#verdict').offsetHeight") > 20
+    page.ask("Emulation.setEmulatedMedia", media="screen")
+    page.settle()
+    assert hand.at(GOAL) == pytest.approx(before, abs=1.0)
+    assert page.complaints() == []
+
+
+@pytest.mark.nightly
 def test_without_a_mission_the_place_is_shown_and_a_cure_is_a_button(page: Browser, field: Path) -> None:
     south, north, west, east = 46.508, 46.512, 8.507, 8.513
     boxes = [(south - 0.001, south, west, east), (north, north + 0.001, west, east),

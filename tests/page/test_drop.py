@@ -234,13 +234,22 @@ def test_ground_of_every_format_is_read_as_the_mission_reads_it_and_taken_whole(
     assert (found["error"], found["cells"], found["files"], found["beside"]) == ("", [[40, 40]], ["a.asc", "a.prj"], 0)
     desk.ask("take", "state", **DATUM)
     assert ((file.parent / "a.asc").read_bytes(), (file.parent / "a.prj").read_bytes()) == (asc, prj)
-    for name, data in (("N46E008.hgt", np.full(1201**2, 120, ">i2").tobytes()), ("a.img", raster("HFA")),
-                       ("a.xyz", raster("XYZ")), ("n46.dt1", raster("DTED", 8.0 - 0.5 / 1200, 47.0 + 0.5 / 1200, cells=1201, step=1 / 1200))):
+    for name, data in (
+        ("N46E008.hgt", np.full(1201**2, 120, ">i2").tobytes()),
+        ("a.img", raster("HFA")),
+        ("a.xyz", raster("XYZ")),
+        ("n46.dt1", raster("DTED", 8.0 - 0.5 / 1200, 47.0 + 0.5 / 1200, cells=1201, step=1 / 1200)),
+    ):
         found = drop(desk, name, data, settings={"vertical_datum": "EGM96", "crs": "EPSG:4326"})
         assert (found["error"], found["beside"]) == ("", 0), name
     tiles = {"west.tif": raster("GTiff", 8.46), "east.tif": raster("GTiff", 8.50)}
     found = drop_all(desk, tiles, **DATUM)
-    assert (found["error"], len(found["cells"]), found["bounds"][0], found["beside"]) == ("", 2, pytest.approx(8.46, abs=1e-3), 0)
+    assert (found["error"], len(found["cells"]), found["bounds"][0], found["beside"]) == (
+        "",
+        2,
+        pytest.approx(8.46, abs=1e-3),
+        0,
+    )
     desk.ask("take", "state", **DATUM)
     assert "dem: [west.tif, east.tif]" in desk.ask("text", "text")["text"]
 

@@ -120,6 +120,14 @@ def test_an_entry_of_a_section_is_moved_to_the_place_of_another() -> None:
     document = {"no_fly": [{"name": "a"}, {"file": "b.kml"}, {"name": "c"}]}
     move = {"list": "no_fly", "from": 2, "to": 0}
     assert arranged(document, move) == {"no_fly": [{"name": "c"}, {"name": "a"}, {"file": "b.kml"}]}
-    for wrong in ({"list": "terrain"}, {"list": "keep_in"}, {"list": []}, {"from": 3}, {"to": -1}, {"to": True}, {"to": "0"}):
+    for wrong in (
+        {"list": "terrain"},
+        {"list": "keep_in"},
+        {"list": []},
+        {"from": 3},
+        {"to": -1},
+        {"to": True},
+        {"to": "0"},
+    ):
         with pytest.raises(PageError):
             arranged(document, move | wrong)

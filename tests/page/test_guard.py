@@ -97,7 +97,11 @@ def test_a_server_proves_its_token_without_telling_it_and_to_its_own_host_alone(
     for path in ("/proof/", "/proof/short", f"/proof/{text}/x", f"/{text}", f"/proof/{'ü' * 32}"):
         assert answer_of(guard, path, HOST)[0]["status"] == 404, path
     assert answer_of(guard, f"/proof/{text}", HOST, method="PUT")[0]["status"] == 404
-    for foreign in ((b"host", b"evil.example"), (b"sec-fetch-site", b"cross-site"), (b"origin", b"http://evil.example")):
+    for foreign in (
+        (b"host", b"evil.example"),
+        (b"sec-fetch-site", b"cross-site"),
+        (b"origin", b"http://evil.example"),
+    ):
         assert answer_of(guard, f"/proof/{text}", HOST, foreign)[0]["status"] == 403
 
 
@@ -113,6 +117,10 @@ def test_an_address_is_kept_for_its_mission_for_a_day_where_nobody_else_reads_it
     assert (file.stat().st_mode & 0o777, file.parent.stat().st_mode & 0o777) == (0o600, 0o700)
     file.chmod(0o666)  # somebody else may have put it there
     assert PageAddress.kept(place) is None
-    for bad in (PageAddress(8123, "short"), PageAddress(0, new_token()), PageAddress(1, new_token(), time.time() - KEPT_S)):
+    for bad in (
+        PageAddress(8123, "short"),
+        PageAddress(0, new_token()),
+        PageAddress(1, new_token(), time.time() - KEPT_S),
+    ):
         bad.keep(place)
         assert PageAddress.kept(place) is None, bad

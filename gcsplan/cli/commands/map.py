@@ -28,7 +28,9 @@ def map_(
             help="The mission file, or sample:NAME; without one the page begins from nothing.",
         ),
     ] = None,
-    port: Annotated[int, typer.Option(metavar="N", help="Port at 127.0.0.1 [default: the last one of this mission, or a free one].")] = 0,
+    port: Annotated[
+        int, typer.Option(metavar="N", help="Port at 127.0.0.1 [default: the last one of this mission, or a free one].")
+    ] = 0,
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")] = True,
     base: Annotated[
         str | None,
@@ -79,7 +81,9 @@ def map_(
             remark(broken_off)
         unsaved = session.close()
         if unsaved is not None:
-            remark(f"note: edits that are not saved are kept in {unsaved}; the next gcsplan map of this mission has them")
+            remark(
+                f"note: edits that are not saved are kept in {unsaved}; the next gcsplan map of this mission has them"
+            )
 
 
 def _comes_back(server: MapServer) -> bool:

@@ -60,14 +60,15 @@ function error(message) {
   banner('error', message.where ? `${message.where}: ${message.message}` : message.message, [], 'bad', 12000);
 }
 
-// A banner by name; empty words take it away. It goes by itself after some time if it reports only what has happened.
+// A banner by name; empty words take it away. It goes by itself after some time if it reports only what has happened: it
+// then lies over the page, so that nothing moves away under the pointer.
 export function banner(name, words, buttons = [], look = 'warn', after = 0) {
   const old = banners.get(name);
   if (old && words && old.words === words && !after) return;
   if (old) { clearTimeout(old.timer); old.made.remove(); banners.delete(name); }
   if (!words) return;
   const close = button('✕', () => banner(name, ''), { class: 'close', 'aria-label': 'Close this message' });
-  const made = el('div', { class: `banner ${look}`, role: look === 'bad' ? 'alert' : null }, el('span', {}, words), ...buttons, close);
+  const made = el('div', { class: `banner ${look}${after ? ' passing' : ''}`, role: look === 'bad' ? 'alert' : null }, el('span', {}, words), ...buttons, close);
   byId('banners').append(made);
   banners.set(name, { made, words, timer: after ? setTimeout(() => banner(name, ''), after) : 0 });
 }

@@ -26,8 +26,21 @@ export function button(words, press, given = {}) {
   return el('button', { type: 'button', onclick: press, ...given }, words);
 }
 
+// What is pressed stays until it is let go: a click on an element that was replaced meanwhile would be lost.
+let pressed = null;
+const later = new Map();
+document.addEventListener('pointerdown', (event) => { pressed = event.target; }, true);
+for (const kind of ['pointerup', 'pointercancel']) {
+  document.addEventListener(kind, () => {
+    pressed = null;
+    setTimeout(() => { for (const [box, children] of later) if (!box.contains(pressed)) refill(box, ...children); });
+  }, true);
+}
+
 // Replaces the children, and gives the focus back to the element of the same id.
 export function refill(box, ...children) {
+  later.delete(box);
+  if (pressed && box.contains(pressed)) { later.set(box, children); return; }
   const active = document.activeElement, id = active && box.contains(active) ? active.id : '';
   box.replaceChildren(...children.filter((child) => child));
   if (id && byId(id)) byId(id).focus({ preventScroll: true });

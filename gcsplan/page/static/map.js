@@ -29,7 +29,17 @@ export function startMap() {
   byId('zoom-out').addEventListener('click', () => map.zoomOut({ duration: 150 }));
   byId('zoom-all').addEventListener('click', fit);
   DARK.addEventListener('change', () => { shown = ''; if (known.state) dress(known.state); });
+  matchMedia('print').addEventListener('change', ({ matches }) => print(matches));
   return map;
+}
+
+// On paper the map has another size: it shows the whole mission there, and then what it showed before.
+let onScreen = null;
+function print(paper) {
+  if (paper) onScreen = { center: map.getCenter(), zoom: map.getZoom() };
+  map.resize();
+  if (paper) fit(); else if (onScreen) map.jumpTo(onScreen);
+  map.redraw();
 }
 
 // Listens last: the other parts of the page have their sizes by then.

@@ -174,7 +174,12 @@ class PageSteps:
     # -- write ---------------------------------------------------------------------------------------------------
 
     def _handed(
-        self, shown: ShownPlan, targets: Mapping[str, str], lists: tuple[bool, bool, bool], *, allow_unjudged: bool,
+        self,
+        shown: ShownPlan,
+        targets: Mapping[str, str],
+        lists: tuple[bool, bool, bool],
+        *,
+        allow_unjudged: bool,
         gate: GateTime | None = None,
     ) -> Handout:
         """What the command line hands out with ``--report``. Raises GcsplanError; earlier outputs are retired then.

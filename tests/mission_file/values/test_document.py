@@ -108,7 +108,10 @@ def test_an_entry_that_is_moved_takes_its_comments_along(order: tuple[int, ...])
     assert read_yaml(text, where="") == new
     assert sorted(text.splitlines()) == sorted(LISTED.splitlines())
     lines = text.splitlines()
-    for above, below in (("  # the mast, since May", "  - name: mast   # of steel"), ("  # the wood", "  - name: wood")):
+    for above, below in (
+        ("  # the mast, since May", "  - name: mast   # of steel"),
+        ("  # the wood", "  - name: wood"),
+    ):
         assert lines[lines.index(below) - 1] == above
     assert lines[lines.index("    radius_m: 5") + 1] == "      # its height is not known"
 

@@ -84,7 +84,9 @@ def test_a_file_is_written_into_the_folder_and_never_through_a_link(tmp_path: Pa
         place_in(folder, Dropped("d.kml", "zones", b""))
 
 
-def test_files_of_ground_come_together_within_bounds_and_no_other_kind_joins_them(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_files_of_ground_come_together_within_bounds_and_no_other_kind_joins_them(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr("gcsplan.page.dropped.shelf.MOST_TOGETHER_BYTES", 10)
     shelf = Shelf()
     shelf.put(shelf.receive("a.prj", None))
