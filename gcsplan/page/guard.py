@@ -6,8 +6,8 @@ nothing else keeps a foreign page from opening one.
 
 A new start for the same mission has the port and the token of the last one, so that an open page goes on. While no
 server runs, another user's program may take the port. So a page that lost its server sends the token to nobody before
-the answer to a random text (`proof_of`) shows that the other end knows it, and a token counts at its own port alone: where the
-port is taken, or a day has passed, the address is a new one.
+the answer to a random text (`proof_of`) shows that the other end knows it, and a token counts at its own port alone:
+where the port is taken, or a day has passed, the address is a new one.
 """
 
 from __future__ import annotations

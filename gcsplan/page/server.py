@@ -73,7 +73,8 @@ LOOKED_UP: ForClient = {"cache-control": "no-cache"}
 class MapServer:
     """Serves the page of ``session`` at a free port, or at ``port``; `url` is its address. Raises UsageError.
 
-    ``kept``: the address of an earlier run, which it has again if the port is free and no other one is given. Runs in a thread of its own, from `start` to `stop`.
+    ``kept``: the address of an earlier run, which it has again if the port is free and no other one is given.
+    Runs in a thread of its own, from `start` to `stop`.
     """
 
     def __init__(

@@ -208,12 +208,14 @@ def test_on_paper_there_is_the_whole_mission_and_no_control(hand: Hand) -> None:
         "[...document.querySelectorAll('button:not(.spot):not(.point), input, dialog')].filter((e) => e.offsetParent)"
     )
     assert page.evaluate(f"{shown}.map((e) => e.outerHTML)") == []
-    box = page.evaluate(
-        "(({left, right, top, bottom}) => [left, right, top, bottom])(document.querySelector('#place').getBoundingClientRect())"
+    rectangle = "document.querySelector('#place').getBoundingClientRect()"
+    left, right, top, bottom = page.evaluate(
+        f"(({{left, right, top, bottom}}) => [left, right, top, bottom])({rectangle})"
     )
     for point in (START, GOAL):
         x, y = hand.at(point)
-        assert box[0] < x < box[1] and box[2] < y < box[3], point
+        assert left < x < right, point
+        assert top < y < bottom, point
     assert page.evaluate("document.querySelector('#verdict').offsetHeight") > 20
     page.ask("Emulation.setEmulatedMedia", media="screen")
     page.settle()

@@ -422,7 +422,10 @@ def _gate(message: Mapping[str, Any]) -> GateTime | None:
 
 
 def _targets(message: Mapping[str, Any], source: MissionFile, plan: Plan | None) -> dict[str, str]:
-    """Vehicle name to URL, as ``--upload`` reads what the user typed; of a plan, those that fly. Raises PageError."""
+    """Vehicle name to URL, as ``--upload`` reads what the user typed; with a plan, for the vehicles that fly.
+
+    Raises PageError.
+    """
     words = _words(message)
     try:
         to = uploads.targets(words, [r.vehicle for r in source.vehicles])

@@ -27,7 +27,7 @@ ANYONE = 0
 """The system id of a seat for all vehicles that are heard there."""
 
 MOST_STRANGERS = 32
-"""Most vehicles that are followed at such a seat: those that were heard first."""
+"""Most vehicles that are followed at such a seat: the first that are heard."""
 
 _POSITION = 33
 

@@ -60,7 +60,8 @@ def test_a_newer_file_supersedes_one_that_is_still_coming() -> None:
 @pytest.mark.parametrize(
     ("name", "data", "kind"),
     [("a.plan", b"{}", "mission"), ("a.txt", b"\xef\xbb\xbfQGC WPL 110\n", "mission"), ("a.txt", b"AC D\n", "zones"),
-     ("a.json", b"{}", "zones"), ("a.TIF", b"II*\0", "ground"), ("N46E008.hgt", b"", "ground"), ("a.tif.aux.xml", b"", "ground")],
+     ("a.json", b"{}", "zones"), ("a.TIF", b"II*\0", "ground"), ("N46E008.hgt", b"", "ground"),
+     ("a.tif.aux.xml", b"", "ground")],
 )  # fmt: skip
 def test_the_kind_is_known_by_name_and_first_bytes(name: str, data: bytes, kind: str) -> None:
     shelf = Shelf()
