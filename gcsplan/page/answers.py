@@ -31,7 +31,7 @@ PROFILE_SAMPLES = 400
 """Samples of a profile; a few more if there are many legs."""
 
 MOST_PROFILES = 12
-"""Most vehicles of a plan whose profiles are all sent; of more, the chosen one's alone: the page draws one at a time."""
+"""Most vehicles of a plan whose profiles are all sent; of more, the chosen one's alone: the page draws one."""
 
 MOST_ON_PAGE = 50
 """Most findings and most notes of one vehicle."""
