@@ -198,8 +198,11 @@ def laid_out(dropped: Dropped) -> Iterator[Path]:
     """A folder of our own with the files, for readers that find one by the name of another; it goes at the end."""
     with tempfile.TemporaryDirectory(prefix="gcsplan-") as made:
         folder = Path(made).resolve()
-        for one in dropped.all:
-            (folder / one.name).write_bytes(one.data)
+        try:
+            for one in dropped.all:
+                (folder / one.name).write_bytes(one.data)
+        except OSError as why:
+            raise InputError(f"the file cannot be laid out to be read: {why.strerror}", where=dropped.name) from None
         yield folder
 
 
