@@ -37,7 +37,7 @@ KEPT_S = 86_400.0
 PROOF = "proof/"
 """Before a random text: the one path without a token."""
 
-_TOKEN = re.compile(r"[A-Za-z0-9_-]{32}")
+_TOKEN_TEXT = re.compile(r"[A-Za-z0-9_-]{32}")
 
 REFUSALS = {403: b"forbidden\n", 404: b"not found\n", 405: b"method not allowed\n", 429: b"too many requests\n"}
 
@@ -67,7 +67,9 @@ class PageAddress:
         """The address of the mission at ``place`` of an earlier run; None if there is none, or only an old one."""
         try:
             found = cls(**json.loads(cache.read_kept(_kept_as(place)) or b"{}"))
-            good = _TOKEN.fullmatch(found.token) and 0 < found.port < 2**16 and abs(time.time() - found.at_s) < KEPT_S
+            good = (
+                _TOKEN_TEXT.fullmatch(found.token) and 0 < found.port < 2**16 and abs(time.time() - found.at_s) < KEPT_S
+            )
         except (ValueError, TypeError):
             return None
         return found if good else None
@@ -131,7 +133,7 @@ class Guard:
         status = self._refusal(scope)
         if status:
             given = scope["path"].removeprefix(f"/{PROOF}")
-            if status == 404 and scope["type"] == "http" and scope["method"] == "GET" and _TOKEN.fullmatch(given):
+            if status == 404 and scope["type"] == "http" and scope["method"] == "GET" and _TOKEN_TEXT.fullmatch(given):
                 await _answer(send, 200, proof_of(self.token, given).encode(), self._headers)
             else:
                 await _refuse(scope, receive, send, status, self._headers)

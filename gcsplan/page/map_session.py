@@ -25,7 +25,7 @@ from gcsplan.mission_file.load import MOST_VEHICLES_OF_FILE, zones_by_entry
 from gcsplan.mission_file.request import Content
 from gcsplan.page import answers
 from gcsplan.page.drop import DroppedFile
-from gcsplan.page.dropped.shelf import GROUND, Shelf, endings
+from gcsplan.page.dropped.shelf import GROUND_ENDINGS, Shelf, endings
 from gcsplan.page.edits import Edits, terrain_choices
 from gcsplan.page.fleet.crew_changes import arrival_of
 from gcsplan.page.fleet.scene import scene_answer
@@ -451,7 +451,7 @@ class MapSession:
             "type": "state", "n": self._n, "stage": edits.stage, "name": str(document.get("name", "")),
             "file": None if file is None else file.name, "saved": edits.is_saved, "disk": self._disk,
             "restored": edits.restored, "undo": edits.can_undo, "redo": edits.can_redo,
-            "files": terrain_choices(edits.store.folder), "drops": endings(), "grounds": list(GROUND),
+            "files": terrain_choices(edits.store.folder), "drops": endings(), "grounds": list(GROUND_ENDINGS),
             "base": self._base,
             "units": {"name": self._units.name, "systems": list(SYSTEMS), "kinds": self._units.as_dict()},
             "bounds": _bounds_of(vehicles) or (self._tiles.bounds if self._tiles is not None else None),

@@ -33,10 +33,10 @@ from gcsplan.world.terrain.input_files import (
 
 DroppedKind = Literal["mission", "zones", "ground"]
 
-BESIDE = (".prj", ".aux.xml", ".tfw", ".wld", ".hdr", ".ovr", ".msk", ".ige", ".rrd")
+RASTER_SIDECARS = (".prj", ".aux.xml", ".tfw", ".wld", ".hdr", ".ovr", ".msk", ".ige", ".rrd")
 """Endings of files beside a raster, which GDAL finds by its name."""
 
-GROUND = (*TERRAIN_FILES, *BESIDE)
+GROUND_ENDINGS = (*TERRAIN_FILES, *RASTER_SIDECARS)
 
 MOST_GROUND_BYTES, MOST_TOGETHER_BYTES, MOST_TOGETHER = 128 * 2**20, 256 * 2**20, 64
 """Most bytes of a raster, and most bytes and number of all that are dropped together."""
@@ -67,7 +67,7 @@ class Dropped:
     @property
     def rasters(self) -> list[str]:
         """The names that ``terrain.dem`` has of ground: a .vrt stands for what it puts together."""
-        names = [one.name for one in self.all if ending_of(one.name) not in BESIDE]
+        names = [one.name for one in self.all if ending_of(one.name) not in RASTER_SIDECARS]
         return [name for name in names if ending_of(name) == ".vrt"] or names
 
 
@@ -77,7 +77,7 @@ def endings() -> dict[str, int]:
     return {
         **dict.fromkeys(zones, MAX_ZONE_BYTES),
         **dict.fromkeys(VEHICLE_FILES, MAX_FILE_BYTES),
-        **dict.fromkeys(GROUND, MOST_GROUND_BYTES),
+        **dict.fromkeys(GROUND_ENDINGS, MOST_GROUND_BYTES),
     }
 
 
@@ -190,7 +190,7 @@ def _kind_of(name: str, data: bytes) -> DroppedKind:
     ending = ending_of(name)
     if ending in VEHICLE_FILES or data.removeprefix(b"\xef\xbb\xbf").startswith(_WAYPOINTS):
         return "mission"
-    return "ground" if ending in GROUND else "zones"
+    return "ground" if ending in GROUND_ENDINGS else "zones"
 
 
 @contextmanager
