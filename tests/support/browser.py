@@ -137,7 +137,7 @@ class Browser:
             elif name == "Runtime.consoleAPICalled" and params["type"] in ("error", "warning", "assert"):
                 reported.append(json.dumps(params["args"]))
             elif name == "Log.entryAdded" and params["entry"]["level"] in ("error", "warning"):
-                reported.append(params["entry"]["text"])
+                reported.append(" ".join((params["entry"]["text"], params["entry"].get("url", ""))))
         return reported
 
     def requests(self) -> list[str]:
