@@ -44,6 +44,8 @@ MOST_OPENED = 200_000
 DETOURS, DETOUR_STEPS, DETOUR_PART = (0.2, 0.4, 0.6, 0.8), 4.0, 0.03
 """Where along the first track a disc is closed to find other tracks, as parts; its radius, in lattice steps, and at
 least as a part of the straight track."""
+ASIDE = 0.03
+"""Half the width of the corridor around a track that is pulled alone, as a part of the straight track."""
 BETTER = 0.5
 """Part of the work left that other tracks and kicks may take once there is a path."""
 LINE_KICKS = 10
@@ -74,11 +76,6 @@ def plan_band(problem: Problem, tell: Tell, *, climbs: bool = True) -> Floats:
             best = found if best is None else min(best, found, key=lambda p: problem.cost(Path(p)))
         # A path longer than the detours that this lattice holds may have a shorter rival outside it: try the next one.
         if best is not None and (work.line is None or track_length_m(best) <= level.detour * way):
-            tell("pull", problem.cost(Path(best)))
-            if work.line is not None:
-                better = work.improve(tell)
-                if better is not None and problem.cost(Path(better)) < problem.cost(Path(best)):
-                    best = better
             break
     if best is None:
         raise _not_found(problem, router)
@@ -106,6 +103,49 @@ def cheaper(problem: Problem, tell: Tell, known: Floats, longest_m: float) -> Fl
         if best is not None and problem.cost(Path(best)) < cost:
             return best
     return None
+
+
+def pulled(
+    problem: Problem, judge: LegJudge, points: Floats, pinned: Bools, pin_m: Floats
+) -> tuple[Floats, Bools] | None:
+    """Way points (M, 3) over the track of a chain (N, 3) pulled tight, and (M,) which must stay; None if they are not
+    legal. Zones are passed over or under as the chain does; ``pinned``, ``pin_m`` (N,): see `GuidedTrack`."""
+    way_m, over = straight_way_m(problem), sides_to_pass(problem, points, pinned, pin_m)
+    points = np.ascontiguousarray(points[:, :2])
+    guide = make_guide(problem, [points], ASIDE * way_m, over)
+    line = guide.pull(line_of(points, pinned, pin_m), np.array(FINE_STEPS) * way_m, COARSE_GAIN * way_m, rounds=2)
+    found = _mended(problem, judge, line, over, way_m)[0]
+    return None if isinstance(found, Unsettled) else found
+
+
+def _mended(
+    problem: Problem, judge: LegJudge, line: GuidedTrack, over: dict[int, bool], way_m: float
+) -> tuple[tuple[Floats, Bools] | Unsettled, GuidedTrack]:
+    """Make way points of a line; after each refusal by the exact check, correct the guide and pull the line again.
+
+    Return the way points, or why there are none, and the line as last pulled.
+    """
+    found: tuple[Floats, Bools] | Unsettled
+    guide = make_guide(problem, [line.points], NARROW * way_m, over, FINE_M)
+    line = guide.pull(line, np.array(FINE_STEPS) * way_m, FINE_GAIN * way_m, rounds=3)
+    for attempt in range(MENDS):
+        found = settle(problem, judge, line.points, line.pinned, line.pin_m)
+        if not isinstance(found, Unsettled):
+            break
+        guide.learn(found.samples)
+        why = found.past or found
+        if why.kind == "pinched" and math.isfinite(why.by):
+            guide.narrow(why.place, 0.5 * why.by + 0.3)
+            guide.narrow(why.place, 0.5 * why.by + 0.3, ceiling=True)
+        elif why.kind in ("pinched", "zone"):
+            guide.narrow(why.place, 1e4)
+        elif attempt:
+            guide.strict()
+        steps = FINE_STEPS if attempt < 2 else COARSE_STEPS
+        line = guide.pull(line, np.array(steps) * way_m, COARSE_GAIN * way_m)
+        if not problem.budget.goes_on():
+            break
+    return found, line
 
 
 def _not_found(problem: Problem, router: Router | None) -> Refusal:
@@ -173,7 +213,7 @@ class _Work:
             line = self._line(way)
             self.guide = self._guide([line.points])
             line = self.guide.pull(line, self._steps(COARSE_STEPS), COARSE_GAIN * self.way_m, rounds=2)
-            found, line = self._mend(line)
+            found, line = self._mended(line)
             if not isinstance(found, Unsettled):
                 self.line = line
                 return found[0]
@@ -200,7 +240,7 @@ class _Work:
         """Way points of the best line from several tracks and kicks; None if it is not legal."""
         with self.problem.budget.allow(BETTER):
             best = self._best_line(tell)
-        found, self.line = self._mend(best)
+        found, self.line = self._mended(best)
         if isinstance(found, Unsettled):
             return None
         return fewer(self.problem, *found, WORTH * self.way_m * _unit(self.problem))[0]
@@ -248,32 +288,8 @@ class _Work:
     def _steps(self, parts: tuple[float, ...]) -> Floats:
         return np.array(parts) * self.way_m
 
-    def _mend(self, line: GuidedTrack) -> tuple[tuple[Floats, Bools] | Unsettled, GuidedTrack]:
-        """Make way points of a line; after each refusal by the exact check, correct the guide and pull the line again.
-
-        Return the way points, or why there are none, and the line as last pulled.
-        """
-        found: tuple[Floats, Bools] | Unsettled
-        guide = make_guide(self.problem, [line.points], NARROW * self.way_m, self.over, FINE_M)
-        line = guide.pull(line, self._steps(FINE_STEPS), FINE_GAIN * self.way_m, rounds=3)
-        for attempt in range(MENDS):
-            found = settle(self.problem, self.judge, line.points, line.pinned, line.pin_m)
-            if not isinstance(found, Unsettled):
-                break
-            guide.learn(found.samples)
-            why = found.past or found
-            if why.kind == "pinched" and math.isfinite(why.by):
-                guide.narrow(why.place, 0.5 * why.by + 0.3)
-                guide.narrow(why.place, 0.5 * why.by + 0.3, ceiling=True)
-            elif why.kind in ("pinched", "zone"):
-                guide.narrow(why.place, 1e4)
-            elif attempt:
-                guide.strict()
-            steps = FINE_STEPS if attempt < 2 else COARSE_STEPS
-            line = guide.pull(line, self._steps(steps), COARSE_GAIN * self.way_m)
-            if not self.problem.budget.goes_on():
-                break
-        return found, line
+    def _mended(self, line: GuidedTrack) -> tuple[tuple[Floats, Bools] | Unsettled, GuidedTrack]:
+        return _mended(self.problem, self.judge, line, self.over, self.way_m)
 
     def _others(self) -> list[Floats]:
         """Other tracks over the lattice: with a price on climbing (energy), and around discs closed on the first."""

@@ -34,7 +34,7 @@ class LatticeSearch(Search):
         return self.FAR_APART if self.incumbent.gap > WIDE else (self.SHARE, self.FAR_APART[1])
 
     def is_open(self) -> bool:
-        """Once; and once more if it ran without a path."""
+        """Once; without a maximum AGL once more if it ran without a path."""
         if self.seen is not None and self.problem.limits.max_agl_m is not None:
             return False
         return super().is_open()

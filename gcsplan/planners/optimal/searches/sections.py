@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Int64s
-from gcsplan.planners.optimal.loop.search import Search, Size
+from gcsplan.planners.lattice.planner import pulled
+from gcsplan.planners.optimal.loop.search import BAND_FAR, Search, Size
 from gcsplan.planners.optimal.loop.workspace import Workspace
 from gcsplan.planners.optimal.plane.section_kernels import NONE, cheapest_chains
 from gcsplan.planners.optimal.plane.sections import (
@@ -135,8 +136,6 @@ class SectionChains(Search):
             return
         looked = self._looked = _Look(planes, sections, incumbent.cost)
         incumbent.budget.spend("section", looked.pairs)
-        if math.isfinite(looked.bound):
-            self._try(sections, looked.chain())
         incumbent.raise_bound(looked.bound)
         halved = before is not None and len(sections.lines) > len(before.sections.lines)
         little = gap - (incumbent.cost - incumbent.bound) < WORTH_MORE * gap
@@ -146,6 +145,8 @@ class SectionChains(Search):
             after += 1
         self._goes_on = after < len(LOOKS) and not (halved and little)
         self._next, self._left = min(after, len(LOOKS) - 1), incumbent.gap
+        if math.isfinite(looked.bound):
+            self._try(sections, looked.chain(), halvings)
 
     def _laid_out(self, planes: Planes, looked: _Look | None, pairs: float, halvings: int) -> Sections | None:
         """The nodes of the next look, over what the last one left; None if they are too far apart, or lie over unknown
@@ -177,13 +178,21 @@ class SectionChains(Search):
             return None
         return lay_out(plane, lines, spans, max(step_m, LEAST_STEP * spacing_m))
 
-    def _try(self, sections: Sections, nodes: Int64s) -> None:
-        """Try a chain as a track."""
+    def _try(self, sections: Sections, nodes: Int64s, halvings: int) -> None:
+        """Try a chain as a track; of the last look, also what it is pulled to, if path and bound are far apart."""
+        incumbent = self.incumbent
         terminal = np.repeat([line.leg is None for line in sections.lines], np.diff(sections.first))[nodes]
-        fixed = terminal & (sections.low[nodes] == sections.high[nodes])
+        low, high = sections.low[nodes], sections.high[nodes]
+        fixed = terminal & (low == high)
         fixed[[0, -1]] = False
         track = np.stack([sections.x[nodes], sections.y[nodes]], axis=-1)
-        self.incumbent.take_along((track, terminal, np.where(fixed, sections.low[nodes], math.nan)))
+        pin_m = np.where(fixed, low, math.nan)
+        incumbent.take_along((track, terminal, pin_m))
+        if (halvings > 0 or not self._goes_on) and incumbent.gap > BAND_FAR:
+            points = np.column_stack([track, 0.5 * (low + high)])
+            found = pulled(self.problem, incumbent.judge, points, terminal, pin_m)
+            if found is not None:
+                incumbent.take_simpler(*found, fine=False, longer=False)
 
 
 class _Look:
