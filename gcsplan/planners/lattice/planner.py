@@ -2,9 +2,9 @@
 
 The cap search of the plane planner does not apply here: whether ground can be crossed depends on the direction, and a
 steep slope is climbed aslant. So tracks are searched on a lattice with the altitudes that can be reached (`routes`),
-then pulled tight on samples of floor and ceiling around them (`corridor_raster`), first until they are legal and then
-until no move makes them cheaper, and finally checked exactly (`profile.exact`). Better tracks are found by closing
-parts of the first one, and by kicks that move a line out of its local optimum.
+then pulled tight on samples of floor and ceiling around them (`corridor_raster`) until they are legal, and checked
+exactly (`profile.exact`). Cheaper tracks are found by closing parts of the first one, and by kicks that move a line out
+of its local optimum; a track that others found is pulled in the same way.
 """
 
 from __future__ import annotations
@@ -109,7 +109,8 @@ def pulled(
     problem: Problem, judge: LegJudge, points: Floats, pinned: Bools, pin_m: Floats
 ) -> tuple[Floats, Bools] | None:
     """Way points (M, 3) over the track of a chain (N, 3) pulled tight, and (M,) which must stay; None if they are not
-    legal. Zones are passed over or under as the chain does; ``pinned``, ``pin_m`` (N,): see `GuidedTrack`."""
+    legal. While it is pulled, zones are passed over or under as the chain does; ``pinned``, ``pin_m`` (N,): see
+    `GuidedTrack`."""
     way_m, over = straight_way_m(problem), sides_to_pass(problem, points, pinned, pin_m)
     points = np.ascontiguousarray(points[:, :2])
     guide = make_guide(problem, [points], ASIDE * way_m, over)
