@@ -293,14 +293,9 @@ class _Work:
         return _mended(self.problem, self.judge, line, self.over, self.way_m)
 
     def _others(self) -> list[Floats]:
-        """Other tracks over the lattice: with a price on climbing (energy), and around discs closed on the first."""
+        """Other tracks over the lattice: around discs closed on the first."""
         assert self.line is not None
-        router, p = self.router, self.problem
-        if router.opened > MOST_OPENED // 4:
-            return []
-        weight = climbing_weight(p)
-        prices = [] if weight == self.weight else [weight]
-        ways = [way for way in (router.way(weight=w, briefly=True) for w in prices) if way is not None]
+        router, p, ways = self.router, self.problem, list[Floats]()
         s = distances_m(self.line.points)
         floor = router.lattice.floor_m
         for f in DETOURS:
@@ -309,7 +304,7 @@ class _Work:
             place = [np.interp(f * s[-1], s, self.line.points[:, k]) for k in range(2)]
             router.lattice.floor_m = floor.copy()
             router.lattice.shut(np.array(place), max(DETOUR_STEPS * router.lattice.step_m, DETOUR_PART * self.way_m))
-            way = router.way(weight=weight, briefly=True)
+            way = router.way(weight=self.weight, briefly=True)
             if way is not None:
                 ways.append(way)
         router.lattice.floor_m = floor
