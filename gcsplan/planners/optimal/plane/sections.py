@@ -23,6 +23,7 @@ from gcsplan.planners.optimal.navmesh.zone_kernels import (
     TOP_AGL,
 )
 from gcsplan.planners.optimal.navmesh.zone_shapes import LOOSE, Shapes
+from gcsplan.planners.optimal.plane.corridor import PinnedTrack
 from gcsplan.planners.optimal.plane.leg import Leg
 from gcsplan.planners.optimal.plane.plane_search import PlaneSearch
 from gcsplan.planners.optimal.plane.section_kernels import lay_sections
@@ -82,6 +83,18 @@ class Sections:
         begins = np.append(np.abs(np.diff(self.aside, prepend=math.inf)) > 1.5 * self.step_m, True)
         begins[self.first] = True
         return np.flatnonzero(begins)
+
+    def track_of(self, chain: Int64s) -> PinnedTrack:
+        """A chain of nodes (K,) as a track."""
+        terminal = np.repeat([line.leg is None for line in self.lines], np.diff(self.first))[chain]
+        fixed = terminal & (self.low[chain] == self.high[chain])
+        fixed[[0, -1]] = False
+        track = np.stack([self.x[chain], self.y[chain]], axis=-1)
+        return track, terminal, np.where(fixed, self.low[chain], math.nan)
+
+    def middles_of(self, chain: Int64s) -> Floats:
+        """(K, 3) places of a chain of nodes (K,), midway between floor and ceiling."""
+        return np.stack([self.x[chain], self.y[chain], 0.5 * (self.low[chain] + self.high[chain])], axis=-1)
 
     def spans_of(self, nodes: Bools) -> SectionSpans:
         """The parts of each section that lie between one of the given nodes (N,) and a neighbour."""

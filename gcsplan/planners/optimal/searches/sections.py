@@ -126,7 +126,8 @@ class SectionChains(Search):
         return pairs * LEG_S, self.work.plane.size(1.0)[1] + pairs / 100.0 * NODE_MB
 
     def run(self) -> None:
-        """Raise the bound, and try the cheapest chain as a track."""
+        """Raise the bound, and try the cheapest chain as a track; and what it is pulled to, after later looks that leave
+        path and bound far apart."""
         plane, incumbent, gap = self.work.plane, self.incumbent, self.incumbent.cost - self.incumbent.bound
         planes, (pairs, halvings) = Planes.of(self.problem), LOOKS[self._next]
         if not plane.legs or not plane.reach_longest():
@@ -136,6 +137,9 @@ class SectionChains(Search):
             return
         looked = self._looked = _Look(planes, sections, incumbent.cost)
         incumbent.budget.spend("section", looked.pairs)
+        chain = looked.chain() if math.isfinite(looked.bound) else None
+        if chain is not None:
+            incumbent.take_along(sections.track_of(chain))
         incumbent.raise_bound(looked.bound)
         halved = before is not None and len(sections.lines) > len(before.sections.lines)
         little = gap - (incumbent.cost - incumbent.bound) < WORTH_MORE * gap
@@ -145,8 +149,11 @@ class SectionChains(Search):
             after += 1
         self._goes_on = after < len(LOOKS) and not (halved and little)
         self._next, self._left = min(after, len(LOOKS) - 1), incumbent.gap
-        if math.isfinite(looked.bound):
-            self._try(sections, looked.chain(), halvings)
+        if chain is not None and (halvings > 0 or not self._goes_on) and incumbent.gap > BAND_FAR:
+            _, pinned, pin_m = sections.track_of(chain)
+            found = pulled(self.problem, incumbent.judge, sections.middles_of(chain), pinned, pin_m)
+            if found is not None:
+                incumbent.take_simpler(*found, fine=False, longer=False)
 
     def _laid_out(self, planes: Planes, looked: _Look | None, pairs: float, halvings: int) -> Sections | None:
         """The nodes of the next look, over what the last one left; None if they are too far apart, or lie over unknown
@@ -177,22 +184,6 @@ class SectionChains(Search):
         if step_m > MOST_STEP * spacing_m:
             return None
         return lay_out(plane, lines, spans, max(step_m, LEAST_STEP * spacing_m))
-
-    def _try(self, sections: Sections, nodes: Int64s, halvings: int) -> None:
-        """Try a chain as a track; of the last look, also what it is pulled to, if path and bound are far apart."""
-        incumbent = self.incumbent
-        terminal = np.repeat([line.leg is None for line in sections.lines], np.diff(sections.first))[nodes]
-        low, high = sections.low[nodes], sections.high[nodes]
-        fixed = terminal & (low == high)
-        fixed[[0, -1]] = False
-        track = np.stack([sections.x[nodes], sections.y[nodes]], axis=-1)
-        pin_m = np.where(fixed, low, math.nan)
-        incumbent.take_along((track, terminal, pin_m))
-        if (halvings > 0 or not self._goes_on) and incumbent.gap > BAND_FAR:
-            points = np.column_stack([track, 0.5 * (low + high)])
-            found = pulled(self.problem, incumbent.judge, points, terminal, pin_m)
-            if found is not None:
-                incumbent.take_simpler(*found, fine=False, longer=False)
 
 
 class _Look:
