@@ -126,8 +126,8 @@ class SectionChains(Search):
         return pairs * LEG_S, self.work.plane.size(1.0)[1] + pairs / 100.0 * NODE_MB
 
     def run(self) -> None:
-        """Raise the bound, and try the cheapest chain as a track; and what it is pulled to, after later looks that leave
-        path and bound far apart."""
+        """Raise the bound, and try the cheapest chain as a track; and after later looks, if path and bound are far
+        apart, what it is pulled to."""
         plane, incumbent, gap = self.work.plane, self.incumbent, self.incumbent.cost - self.incumbent.bound
         planes, (pairs, halvings) = Planes.of(self.problem), LOOKS[self._next]
         if not plane.legs or not plane.reach_longest():
