@@ -19,7 +19,7 @@ from gcsplan.arrays import Floats, Indices
 from gcsplan.check.fixed_wing.ends import slant_findings
 from gcsplan.check.flight.corners import round_corners
 from gcsplan.check.flight.follow import follow
-from gcsplan.check.flight.times import FlightTimes
+from gcsplan.check.flight.times import FlightTimes, spare_s
 from gcsplan.check.flight.winds import Costs, FlightInWind
 from gcsplan.check.margins import enough, nearest_misses, nearest_pass
 from gcsplan.check.motion.project import PlaneLegs, legs_in_plane, steep_report, why_unknown, with_error_of_home
@@ -93,9 +93,11 @@ def judge(
         radius_m = {seq: tuning.px4_accepts_m(i)[0] for seq, i in enumerate(stored.items, stored.first_seq)}
     seconds = np.full(len(flight.stretches), math.nan)
     blown: FlightInWind | None = None
-    if times or wind or flight.loop_seq is not None or vehicle.energy.base_w:  # the battery depends on them
+    waits = any(s.until_s is not None for s in flight.stretches)
+    if times or wind or waits or flight.loop_seq is not None or vehicle.energy.base_w:  # the battery depends on them
         clock = FlightTimes(flight.stretches, vehicle, world, home, radius_m)
         seconds = clock.seconds()
+        _set_waits(flight, seconds)
         if wind is not None and (not wind.declared.still or wind.late_s) and _judged_in_wind(flight, vehicle, wind):
             agl_m, agl_of = _agl_m(plane, report, len(flight.stretches)), partial(_agl_along_m, world, vehicle.limits)
             blown = FlightInWind(flight.stretches, clock, vehicle, wind, agl_m, agl_of)
@@ -103,6 +105,7 @@ def judge(
     costs = blown.costs_so_far if blown is not None and windy else None
     figures = _figures(flight, plane, report, vehicle, world, seconds, costs)
     findings += _blown_away(blown)
+    findings += _missed_gates(flight, seconds, blown)
     findings += _findings(flight.stretches, plane, report, vehicle.limits, world)
     over = nearest_pass(flight.stretches, plane.legs, plane.owner, vehicle.limits, world)
     near = nearest_misses(flight.stretches, plane.legs, plane.owner, report, vehicle, world) if misses else ()
@@ -126,6 +129,37 @@ def judge(
         in_wind=blown,
     )  # fmt: skip
     return _with_battery(verdict, vehicle, flight, costs)
+
+
+def _set_waits(flight: Flight, seconds: Floats) -> None:
+    """Give each wait until a time of day the seconds that it lasts in still air; in a round these are not judged."""
+    rounds = any(s.times > 1 or s.jumped_from is not None for s in flight.stretches)
+    now_s = 0.0
+    for k, s in enumerate(flight.stretches):
+        if s.until_s is not None and rounds:
+            flight.not_judged.append(Note("waits_until_time", s.seq))
+            flight.stretches[k] = replace(s, until_s=None)
+        elif s.until_s is not None:
+            flight.stretches[k] = replace(s, hold_s=max(s.until_s - now_s, 0.0))
+            now_s = max(s.until_s, now_s)
+            continue
+        now_s += float(seconds[k]) + s.hold_s
+
+
+def _missed_gates(flight: Flight, seconds: Floats, blown: FlightInWind | None) -> list[Finding]:
+    """The findings on gates that the vehicle may reach after their second, for which it would wait until the next day."""
+    found, opened_s, reached_s = [], 0.0, 0.0
+    for k, s in enumerate(flight.stretches):
+        if s.until_s is None:
+            reached_s += float(seconds[k]) + s.hold_s
+            continue
+        latest_s = reached_s if blown is None or blown.window is None else float(blown.window.latest_s[k - 1])
+        by_s = latest_s + spare_s(latest_s - opened_s) - s.until_s
+        if by_s > 0.0:
+            note = Note("gate_missed", s.seq, latest_s=latest_s, opens_s=s.until_s, by_s=by_s)
+            found.append(Finding(s.seq, "gate", note, *s.end, latest_s, latest_s - by_s, by_s, "s"))
+        opened_s = reached_s = s.until_s
+    return found
 
 
 def _judged_in_wind(flight: Flight, vehicle: Vehicle, wind: FlightWind) -> bool:
@@ -308,6 +342,7 @@ def _figures(
                 jumped_from=s.jumped_from,
                 lead_j=_lead_j(vehicle, s, float(run_m), worst_s, 0.0 if costs is None else float(costs.wind_m_s[i])),
                 speed_m_s=s.speed_m_s,
+                until_s=s.until_s,
             )
         )  # fmt: skip
     return tuple(figures)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from itertools import accumulate
 from typing import TYPE_CHECKING
 
+from gcsplan.check.flight.times import spare_s
 from gcsplan.check.margins import Miss, ZonePass
 from gcsplan.check.motion.stretch import Place, StretchKind
 from gcsplan.mavlink.mission.mission import Mission
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from gcsplan.fleet.arrival import Slot
 
 
+WHOLE_S = 1.0
 PAPER_MARK = " (paper's figures)"
 
 
@@ -30,7 +32,8 @@ class LegFigures:
     ``min_agl_m`` counts from the ground and what stands on it, on the line itself; ``agl_end_m`` from bare ground.
     ``energy_j`` and ``time_s`` include the hold at the leg's end, ``hold_j`` and ``hold_s``; ``hold_s`` may be
     infinite (a loiter without end takes no energy and no time here). The figures are for one pass; ``times``: how
-    often it is flown, if a jump leads back. ``jumped_from``: the jump that leads to it. ``lead_j``: of ``energy_j``,
+    often it is flown, if a jump leads back. ``until_s``: its hold ends at a time of day, so many seconds after
+    the vehicle has left the ground. ``jumped_from``: the jump that leads to it. ``lead_j``: of ``energy_j``,
     what is at most spent ahead of an even share on the way: the base power while it is slower than its top speed.
     ``speed_m_s``: commanded.
     """
@@ -58,6 +61,7 @@ class LegFigures:
     jumped_from: int | None = None
     lead_j: float = 0.0
     speed_m_s: float = math.nan
+    until_s: float | None = None
 
 
 def by_item(legs: Sequence[LegFigures]) -> Iterator[tuple[LegFigures, int]]:
@@ -217,6 +221,26 @@ class Verdict:
         still = zip(self.clock_s(slot), self.clock_s(), strict=True)
         ends = zip(self.in_wind.window.earliest_s.tolist(), self.in_wind.window.latest_s.tolist(), strict=True)
         return tuple((early + a - b, late + a - b) for (a, b), (early, late) in zip(still, ends, strict=True))
+
+    def gates_after_s(self) -> tuple[float, ...]:
+        """When each gate may open at the earliest, so that the vehicle is there in every declared wind, seconds from
+        leaving the ground: each as if the one before it opened as early as that. They open at the nearest whole
+        second, so each has one to spare."""
+        found, still_s, before = [], 0.0, 0.0
+        window = None if self.in_wind is None else self.in_wind.window
+        for k, leg in enumerate(self.legs):
+            if leg.until_s is None:
+                still_s += leg.time_s * leg.times
+                continue
+            took_s = still_s if window is None else float(window.latest_s[k - 1]) - self._opened_s(k)
+            before += took_s + spare_s(took_s) + WHOLE_S
+            found.append(before)
+            still_s = 0.0
+        return tuple(found)
+
+    def _opened_s(self, until: int) -> float:
+        """When the last gate before a leg opens, seconds from leaving the ground; 0 before the first."""
+        return next((leg.until_s for leg in reversed(self.legs[:until]) if leg.until_s is not None), 0.0)
 
     @property
     def _arrival(self) -> tuple[int, float]:

@@ -264,6 +264,11 @@ class _MissionReading:
         names = check_unique(self._list("vehicles"), f"{self.where}vehicles", problems)
         arrival_keys = self._section(ArrivalKeys, "arrival")
         arrival = make_arrival(arrival_keys, names, f"{self.where}arrival", problems)
+        given = arrival_keys.gates if arrival_keys is not None and isinstance(arrival_keys.gates, list) else []
+        gates = [
+            make_place(p, f"{self.where}arrival.gates[{j}]", problems, self.notes, local=self.local)
+            for j, p in enumerate(given)
+        ]
         hours = self._hours()
         published, inside = self._zones(hours)
         drafts = used(published)
@@ -304,6 +309,8 @@ class _MissionReading:
                 ground = site.load(problems)
         if problems or frame is None or site is None or ground is None or wind is None:
             raise self._refusal(problems)
+        if gates and arrival is not None:
+            arrival = replace(arrival, gates=tuple(p.in_plane(frame) for p in gates if p is not None))
         info = ground.surface.info
         self.notes += notes_on(info)
         inputs = {k: v for k, v in info.items() if k not in ("notes", "source")}

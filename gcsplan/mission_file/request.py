@@ -21,6 +21,8 @@ from gcsplan.world.geometry.zones import Zone
 from gcsplan.world.terrain.geoid import GeoidGrid
 
 ReturnRequirement = Literal["required", "reported"]
+GatePlaces = tuple[tuple[float, float], ...]
+"""Places of gates: east_m, north_m."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +34,7 @@ class ArrivalRequest:
     can (``fleet``). ``hold`` is where a vehicle waits that would arrive too early: on the ground, at the gate (the top
     of take-off), or nowhere. ``window_s``: each may arrive this much earlier or later. ``pad_clear_s`` is the time
     after a landing at which the pad is free again; None: never. ``leave_out``: vehicles without a mission are left out,
-    and the others are planned.
+    and the others are planned. ``gates``: how many times each copter waits on its way until a time of day, or where.
     """
 
     mode: Literal["sequence", "together", "none"]
@@ -46,6 +48,7 @@ class ArrivalRequest:
     window_s: float = 0.0
     pad_clear_s: float | None = None
     leave_out: bool = False
+    gates: int | GatePlaces | Literal["auto"] | None = None
 
 
 @dataclass(frozen=True, eq=False)

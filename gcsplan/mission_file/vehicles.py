@@ -410,6 +410,7 @@ def make_arrival(
         SEPARATION_M if keys.separation_m is None else keys.separation_m, best_order=keys.order == "best",
         arrive_s=keys.arrive_s, clock=keys.clock, hold=keys.hold, window_s=keys.window_s,
         pad_clear_s=keys.pad_clear_s, leave_out=keys.leave_out,
+        gates=None if isinstance(keys.gates, list) else keys.gates,
     )  # fmt: skip
 
 

@@ -114,6 +114,10 @@ CHECK_TEXTS = {
         "{flown_m:distance.0}; it is judged with {judged_m:distance.0 up}, for a hot day"
     ),
     "climb_rate_uncounted": "a rate of climb or descent for PX4 is not counted in the time",
+    "gate_missed": (
+        "it may come to its gate {by_s:seconds.1} too late for the gate's second, and would wait there until the next "
+        "day"
+    ),
     "waits_until_time": ("the energy of a wait until a time of day is not known; give its seconds (param1)"),
     "hold_without_known_end": (
         "a hold of {hold_s} s (param1) has no end that is known (give its seconds): that is not judged"

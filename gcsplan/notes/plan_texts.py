@@ -152,6 +152,19 @@ PLAN_TEXTS = {
         "the gates open from T+0 = {start_utc} UTC on: a vehicle that comes to its gate after its second waits there "
         "for nearly a day; release each by its time, {spare_s:g} s are to spare"
     ),
+    "gates_on_way_open": (
+        "the gates on the way open from T+0 = {start_utc} UTC on: each vehicle is there early in every declared wind; "
+        "one that comes after its gate's second waits there for nearly a day"
+    ),
+    "no_gates_on_way": (
+        "has no gates: {autopilot} {px4:reads only the seconds of a wait|does not wait in the air while it is armed}, "
+        "so it goes on at once at a gate with a time of day"
+    ),
+    "waits_at_gates": (
+        "waits {wait_s:seconds.0} in all at {count} {count:gate|gates} on its way{energy}; its arrivals in the declared "
+        "winds lie within {width_s:seconds.1} instead of {without_s:seconds.1}"
+    ),
+    "gates_take": (", for {energy_j:joules} at most"),
     "clock_of_fleet": (
         "{first}, the first, arrives at {arrive_s:seconds.1} instead of {alone_s:seconds.1}, so that the others can "
         "follow {interval_s:g} s apart (clock: fleet)"

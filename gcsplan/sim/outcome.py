@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from gcsplan.arrays import Floats
+from gcsplan.check.flight.times import MODEL_PART, MODEL_S
 from gcsplan.check.verdict import PAPER_MARK, Verdict
 from gcsplan.errors import CheckFailed
 from gcsplan.figures import floored
@@ -27,10 +28,6 @@ from gcsplan.world.world import World
 
 LATE_FLIGHT_PART, LATE_FLIGHT_S = 0.1, 5.0
 """A flight that is later by more than this part of its planned time, and by more than these seconds, is late."""
-
-WINDOW_PART, WINDOW_S = 0.005, 0.5
-"""Times are planned and simulated by different models of the same motion: an arrival is outside its window if it is
-off by more than this part of the flight, and by more than these seconds."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +88,7 @@ def outside_s(window_s: tuple[float, float] | None, depart_s: float, arrive_s: f
     if window_s is None or not math.isfinite(arrive_s):
         return 0.0
     off_s = arrive_s - min(max(arrive_s, window_s[0]), window_s[1])
-    return off_s if abs(off_s) > max(WINDOW_PART * (arrive_s - depart_s), WINDOW_S) else 0.0
+    return off_s if abs(off_s) > max(MODEL_PART * (arrive_s - depart_s), MODEL_S) else 0.0
 
 
 def energy_of(
@@ -241,7 +238,7 @@ class Rehearsal:
 
     ``closest``: the nearest approach of any two vehicles in any run, None if no two flew at the same time.
     ``intervals_kept_runs``: in how many runs all intervals between arrivals in the planned order were as planned, up to
-    the terms' ``window_s`` and `WINDOW_S`; ``interval_error_s``: how much longer (shorter: negative) than planned the
+    the terms' ``window_s`` and `MODEL_S`; ``interval_error_s``: how much longer (shorter: negative) than planned the
     worst was, None without an order. ``simulator``: ``gcsplan`` or ``sitl``. ``weather``: the simulated weather, for
     output. ``flown``: the flown paths of the first run, in the order of ``vehicles``.
     """
@@ -480,7 +477,7 @@ class Tally:
         off_s = [off if math.isfinite(off) else math.inf for off in off_s]
         if off_s:
             worst_s = max(off_s, key=abs)
-            self.intervals_kept += abs(worst_s) <= self.terms.window_s + WINDOW_S
+            self.intervals_kept += abs(worst_s) <= self.terms.window_s + MODEL_S
             self.interval_error_s = max(self.interval_error_s, worst_s, key=abs)
 
     def _separation(self, traces: Sequence[Trace]) -> None:

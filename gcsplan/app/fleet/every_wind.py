@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from gcsplan.app.fleet.gates import waits_for_time
 from gcsplan.app.plan.model import Brief, VehiclePlan
 from gcsplan.app.plan.problem import built
 from gcsplan.app.plan.vehicle import rebuilt
@@ -86,7 +87,7 @@ def at_speeds(vehicles: Sequence[VehiclePlan], plan: Schedule, brief: Brief) -> 
         if v.name in slots:
             slot = slots[v.name]
             try:
-                found[v.name] = rebuilt(v, brief, speed_m_s=slot.speed_m_s, hold_s=slot.hold_s)
+                found[v.name] = rebuilt(v, brief, speed_m_s=slot.speed_m_s, hold_s=slot.hold_s, depart_s=slot.depart_s)
             except NoMission:
                 found[v.name] = v
     return found
@@ -122,14 +123,15 @@ def require_intervals(found: Sequence[Interval], mode: Mode, window_s: float, dr
 
 
 def with_cures(why: NoMission, vehicles: Sequence[VehiclePlan], brief: Brief, again: Retimed) -> NoMission:
-    """The refusal with what would do, each tried: a wider window, a longer interval, lower speeds or a weaker wind."""
+    """The refusal with what would do, each tried: a wider window, a longer interval, gates, lower speeds or a weaker
+    wind."""
     if len(vehicles) > MOST_TRIED or not (isinstance(why, NotInEveryWind) or why.reason == "separation"):
         return why
-    found = [*_windows(why, vehicles, brief, again), *_speeds(vehicles, brief, again), *_winds(vehicles, brief, again)]
+    found = [*_windows(why, vehicles, brief, again), *_gates(vehicles, brief, again), *_speeds(vehicles, brief, again), *_winds(vehicles, brief, again)]
     what = (
         f"what works: {', or '.join(found)}"
         if found
-        else "no window, interval, speed or weaker wind that was tried helps"
+        else "no window, interval, gate, speed or weaker wind that was tried helps"
     )
     return NoMission(f"{why}; {what}", reason="time" if isinstance(why, NotInEveryWind) else "separation")
 
@@ -170,6 +172,18 @@ def _windows(why: NoMission, vehicles: Sequence[VehiclePlan], brief: Brief, agai
             break
         bad, good = (bad, middle) if works(middle) else (middle, good)
     return [f"{words} with interval_s: {good}" if words else f"interval_s: {good}"]
+
+
+def _gates(vehicles: Sequence[VehiclePlan], brief: Brief, again: Retimed) -> list[str]:
+    """The least number of gates on the copters' ways, where these need a common start that is not given."""
+    arrival = brief.source.arrival
+    assert arrival is not None
+    if arrival.gates not in (None, "auto") or not any(waits_for_time(v.request.vehicle) for v in vehicles):
+        return []
+    for count in range(1, CURE_TRIES + 1):
+        if _works(again, vehicles, _with(brief, arrival=replace(arrival, gates=count))):
+            return [f"gates: {count} with a common start (--gate-utc)"]
+    return []
 
 
 def _speeds(vehicles: Sequence[VehiclePlan], brief: Brief, again: Retimed) -> list[str]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from datetime import UTC, datetime
 from itertools import pairwise
 from typing import TYPE_CHECKING, Literal
 
@@ -25,8 +26,9 @@ from gcsplan.app.fleet.every_wind import (
     steadier,
     with_cures,
 )
+from gcsplan.app.fleet.gates import WHERE, counts, gated, gates_bought, no_time_of_day, waits_for_time
 from gcsplan.app.fleet.reroute import Detours
-from gcsplan.app.fleet.start_time import SLACK_S, GateTime, gated
+from gcsplan.app.fleet.start_time import SLACK_S, GateTime, with_start_gates
 from gcsplan.app.plan.flight_hours import within_hours
 from gcsplan.app.plan.left_out import LeavingOut, least_to_leave
 from gcsplan.app.plan.model import Brief, FleetPlan, Plan, VehiclePlan
@@ -35,11 +37,12 @@ from gcsplan.arrays import Floats
 from gcsplan.check.flight.times import over_ground, pace_over_ground
 from gcsplan.check.motion.circles import PLANE_LOITER_RADIUS_M, circle_reach_m
 from gcsplan.check.verdict import LegFigures
-from gcsplan.errors import NoMission, heed_cancel
+from gcsplan.errors import InputError, NoMission, heed_cancel
 from gcsplan.fleet.arrival import Craft, Crew, NoSchedule, Schedule, Slot, schedule
 from gcsplan.fleet.intervals import Interval, centred, intervals
 from gcsplan.fleet.motion.timing import Course, Route, TimedPath, motion_error_m
 from gcsplan.mission_file import ArrivalRequest
+from gcsplan.mission_file.request import GatePlaces
 from gcsplan.notes.note import Note
 from gcsplan.planners.problem import Progress
 from gcsplan.world.world import World
@@ -86,6 +89,8 @@ def _line(legs: Sequence[LegFigures], world: World) -> Floats:
     return np.column_stack([world.frame.to_plane(places[:, 0], places[:, 1]), places[:, 2]])
 
 
+ANY_START = datetime(2000, 1, 1, tzinfo=UTC)
+"""A common start at which it is tried how many gates would do, where none is given."""
 LATER_S = 600.0
 """Seconds by which all arrivals may be delayed to keep a fleet apart, if the mission file sets no arrival time."""
 SEPARATION_M = 30.0
@@ -153,26 +158,33 @@ def fleet_of(
     out, and the results are those of the others.
     """
     leaving = leaving or LeavingOut(allowed=False)
-    if brief.source.arrival is None or len(vehicles) < 2 or not any(drifts(v) for v in vehicles):
-        return _fleet_of(vehicles, brief, gate, leaving, {})
+    arrival = brief.source.arrival
+    if arrival is not None and gate is None and arrival.gates not in (None, "auto"):
+        raise InputError("gates open at times of the day: give the common start (--gate-utc)", where=WHERE)
+    if arrival is None or len(vehicles) < 2 or not any(drifts(v) for v in vehicles):
+        return _fleet_of(vehicles, _having(brief, next(counts(arrival and arrival.gates))), gate, leaving, {})
 
     def again(tried: Sequence[VehiclePlan], terms: Brief) -> tuple[tuple[VehiclePlan, ...], FleetPlan]:
-        """As in still air; else at speeds at which the vehicles drift less."""
-        strict = LeavingOut(allowed=False)
-        speeds = {} if terms.source.arrival is None else steadier(tried, terms.source.arrival.hold)
-        try:
-            return _fleet_of(tried, terms, gate, strict, {})
-        except NoMission:
-            if not speeds:
-                raise
-        return _fleet_of(tried, terms, gate, strict, speeds)
+        """With as few gates as are requested; as in still air, or else at speeds at which the vehicles drift less."""
+        assert terms.source.arrival is not None
+        request, refusal = terms.source.arrival.gates, NoMission("", reason="time")
+        speeds = steadier(tried, terms.source.arrival.hold)
+        for gates in counts(None if request == "auto" and gate is None else request):
+            for pace in ({}, speeds) if speeds else ({},):
+                start = gate if gates is None else gate or GateTime(ANY_START)
+                try:
+                    return _fleet_of(tried, _having(terms, gates), start, LeavingOut(allowed=False), pace)
+                except NoMission as why:
+                    refusal = why
+        raise refusal
 
     try:
         return again(vehicles, brief)
     except NoMission as why:
         if not leaving.allowed:
             raise with_cures(why, vehicles, brief, again) from why
-    speeds = steadier(vehicles, brief.source.arrival.hold)
+    brief = _having(brief, None if arrival.gates == "auto" else arrival.gates)
+    speeds = steadier(vehicles, arrival.hold)
     while True:
         tried = LeavingOut(allowed=True, found=leaving.found)
         try:
@@ -187,19 +199,39 @@ def fleet_of(
         return found
 
 
+def _having(brief: Brief, gates: int | GatePlaces | None) -> Brief:
+    """The brief with these gates."""
+    arrival = brief.source.arrival
+    if arrival is None or arrival.gates == gates:
+        return brief
+    return replace(brief, source=replace(brief.source, arrival=replace(arrival, gates=gates)))
+
+
 def _fleet_of(
     vehicles: Sequence[VehiclePlan], brief: Brief, gate: GateTime | None, leaving: LeavingOut,
     speeds: Mapping[str, SpeedRange],
 ) -> tuple[tuple[VehiclePlan, ...], FleetPlan]:  # fmt: skip
     """`fleet_of`, with the ``speeds`` of some vehicles."""
     world, arrival = brief.world, brief.source.arrival
-    crews = [_paced(crew_of(v, world), speeds.get(v.name, SpeedRange())) for v in vehicles]
+    gates = None if arrival is None or gate is None else arrival.gates
+    common, gate_times = gate, None if gates else gate
+
+    def on_way(some: Sequence[VehiclePlan]) -> list[VehiclePlan]:
+        if not gates or common is None or gates == "auto":
+            return list(some)
+        return gated(some, brief, gates, common.start, {name: pace.most_m_s for name, pace in speeds.items()})
+
+    vehicles = on_way(vehicles)
+    crews = [_paced(crew_of(v, world), _pace_of(v, speeds)) for v in vehicles]
     notes: list[Note] = []
     requested = None
     if arrival is None:
         plan = schedule(crews, "none")
     else:
-        detours = Detours(vehicles, brief, rules_of(arrival, vehicles, world), lambda v: route_of(v, world))
+        detours = Detours(
+            vehicles, brief, rules_of(arrival, vehicles, world), lambda v: route_of(v, world),
+            lambda v: on_way([v])[0] if waits_for_time(v.request.vehicle) else v,
+        )  # fmt: skip
         requested, notes = _scheduled(crews, arrival, detours, leaving)
         plan = requested
         if any(drifts(v) for v in vehicles):
@@ -209,7 +241,7 @@ def _fleet_of(
         placed = {slot.name: slot for slot in plan.slots}
         vehicles = [detours.plan_of(v.name, placed[v.name].route) for v in vehicles if v.name in placed]
         crews = [crew_of(v, world) for v in vehicles]
-    flown, slots = _timed(vehicles, crews, plan, brief, gate, leaving)
+    flown, slots = _timed(vehicles, crews, plan, brief, gate_times, leaving)
     leaving.require_some(flown)
     flown, slots, motions, found = _judged(flown, slots, arrival, world, leaving)
     if found is not None:
@@ -218,11 +250,21 @@ def _fleet_of(
             notes.append(Note("nothing_keeps_apart", met=too_near(found.conflicts, world)))
     apart = _intervals(requested, flown, slots, arrival, gate)
     if gate is not None:
-        notes.append(Note("gates_open", start_utc=f"{gate.start:%Y-%m-%d %H:%M:%S}", spare_s=SLACK_S))
+        start_utc = f"{gate.start:%Y-%m-%d %H:%M:%S}"
+        notes.append(
+            Note("gates_on_way_open", start_utc=start_utc) if gates
+            else Note("gates_open", start_utc=start_utc, spare_s=SLACK_S)
+        )  # fmt: skip
     notes += [
         Note("speed_kept_in_wind", vehicle=v.name, speed_m_s=speeds[v.name].most_m_s)
         for v in flown if v.name in speeds and not v.request.vehicle.keeps_airspeed
     ]  # fmt: skip
+    if gates:
+        notes += [
+            no_time_of_day(v.request.vehicle).of(vehicle=v.name)
+            for v in flown if not waits_for_time(v.request.vehicle)
+        ]  # fmt: skip
+        flown = [gates_bought(v, slot, brief) for v, slot in zip(flown, slots, strict=True)]
     names = {v.name for v in flown}
     order = tuple(name for name in plan.order if name in names)
     return tuple(flown), FleetPlan(
@@ -251,6 +293,11 @@ def _judged(
     return flown, slots, motions, found
 
 
+def _pace_of(v: VehiclePlan, speeds: Mapping[str, SpeedRange]) -> SpeedRange:
+    """The speeds of a vehicle: with gates the one for which they open."""
+    return speeds.get(v.name, SpeedRange()) if v.order.gates is None else SpeedRange(v.speed_m_s, v.speed_m_s)
+
+
 def _paced(crew: Crew, speeds: SpeedRange) -> Crew:
     return replace(crew, least_m_s=speeds.least_m_s, most_m_s=speeds.most_m_s)
 
@@ -275,7 +322,10 @@ def _kept_in_wind(
             plan = centred(requested, plan, found, later=arrival.arrive_s is None)
             _intervals(requested, list(flown.values()), plan.slots, arrival, gate)
         crews = [
-            replace(c, least_m_s=0.0, drift=flown[c.name].verdict.drift, route=routes[c.name])
+            replace(
+                c, least_m_s=0.0 if flown[c.name].order.gates is None else c.least_m_s,
+                drift=flown[c.name].verdict.drift, route=routes[c.name],
+            )
             for c in crews if c.name in flown
         ]  # fmt: skip
         before = {slot.name: (slot.speed_m_s, slot.route) for slot in plan.slots}
@@ -337,17 +387,20 @@ def _timed(
     slots = [placed[v.name] for v in vehicles]
     opens: list[int | None] = [None] * len(slots)
     if gate is not None:
-        with_gates = gated(crews, slots)
+        with_gates = with_start_gates(crews, slots)
         slots, opens = [slot for slot, _ in with_gates], [opens_s for _, opens_s in with_gates]
     flown, kept = [], []
     for v, slot, opens_s in zip(vehicles, slots, opens, strict=True):
         at = None if gate is None or opens_s is None else gate.of_day(opens_s)
         try:
-            flown.append(rebuilt(v, brief, speed_m_s=slot.speed_m_s, hold_s=slot.hold_s, gate_utc=at))
+            made = rebuilt(
+                v, brief, speed_m_s=slot.speed_m_s, hold_s=slot.hold_s, gate_utc=at, depart_s=slot.depart_s
+            )
         except NoMission as why:
             leaving.leave(v.name, why)
-        else:
-            kept.append(slot)
+            continue
+        flown.append(made)
+        kept.append(slot if made.order.gates is None else replace(slot, arrive_s=slot.depart_s + made.verdict.arrive_s))
     return flown, kept
 
 
@@ -369,6 +422,9 @@ def route_of(v: VehiclePlan, world: World) -> Route:
     points = np.column_stack([world.frame.to_plane(ends[:, 0], ends[:, 1]), ends[:, 2]])
     first = legs.index(flown[0])
     holds = np.array([v.verdict.gate_s, *(leg.hold_s for leg in flown)])
+    waits = [leg for leg in legs if leg.until_s is not None]
+    for wait in waits:  # at the way point before it
+        holds[1 + max(k for k, leg in enumerate(flown) if leg.seq < wait.seq)] += wait.hold_s
     ideal = request.end == "none" and request.start_amsl_m is not None
     ground = legs[0].start[2]
     ends_with = [leg for leg in legs[first:] if not leg.on_path]
@@ -377,6 +433,9 @@ def route_of(v: VehiclePlan, world: World) -> Route:
     if v.order.altitude_frame == "terrain":
         points, holds, numbers = over_ground(points, holds, numbers, world.vehicle_terrain)
     items = np.array([legs[0].seq, *numbers, last.seq], dtype=np.intp)
+    own = np.append(items[:1], numbers)  # a hold belongs to its way point, unless it is an item of its own
+    for wait in waits:
+        own[np.flatnonzero(own < wait.seq)[-1]] = wait.seq
     pace = pace_over_ground(points, legs[0].start[:2], world.frame) if request.vehicle.lays_curves else None
     climb_out, glide = _climb_out_and_glide(v, world)
     return Route(
@@ -392,6 +451,7 @@ def route_of(v: VehiclePlan, world: World) -> Route:
         glide=glide,
         pace=pace,
         follows=v.order.altitude_frame == "terrain",
+        hold_items=own if waits else None,
     )  # fmt: skip
 
 

@@ -43,13 +43,14 @@ DETOUR_SPARE_M = 2.0
 class Detours:
     """Plan other paths: calling it is the ``replan`` of `fleet.resolve`, `longer` is that of `fleet.arrival`.
 
-    `plan_of` returns the plan of a route that either of them made.
+    `plan_of` returns the plan of a route that either of them made. ``gated`` puts the vehicle's gates on a way.
     """
 
     def __init__(
-        self, vehicles: Sequence[VehiclePlan], brief: Brief, rules: Rules, route_of: Callable[[VehiclePlan], Route]
-    ) -> None:
-        self._plans = {v.name: v for v in vehicles}
+        self, vehicles: Sequence[VehiclePlan], brief: Brief, rules: Rules, route_of: Callable[[VehiclePlan], Route],
+        gated: Callable[[VehiclePlan], VehiclePlan],
+    ) -> None:  # fmt: skip
+        self._plans, self._gated = {v.name: v for v in vehicles}, gated
         self._brief, self._rules, self._route_of = brief, rules, route_of
         self._found: list[tuple[Route, VehiclePlan]] = []
         self._known: dict[object, Route | None] = {}
@@ -130,7 +131,7 @@ class Detours:
         if limits is not None:  # the mission file's take-off height may be below the raised limit
             request = replace(request, takeoff_agl_m=None, approach_agl_m=None)
         try:
-            plan = plan_vehicle(self._brief, request, limits=limits, searched=searched)
+            plan = self._gated(plan_vehicle(self._brief, request, limits=limits, searched=searched))
         except (NoMission, InputError):
             return None
         own = self._plans[name]

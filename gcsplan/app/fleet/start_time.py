@@ -77,7 +77,7 @@ class GateTime:
         return at.hour, at.minute, at.second
 
 
-def gated(crews: Sequence[Crew], slots: Sequence[Slot]) -> list[tuple[Slot, int]]:
+def with_start_gates(crews: Sequence[Crew], slots: Sequence[Slot]) -> list[tuple[Slot, int]]:
     """Each slot, its hold extended to a whole second `SLACK_S` or more after reaching its gate, and that second (T+ s).
 
     Slots and crews are in the same order. Every vehicle arrives later by the extension of its hold. Raises InputError

@@ -16,7 +16,7 @@ from gcsplan.arrays import Floats
 from gcsplan.check.verdict import Verdict
 from gcsplan.errors import InputError, NoMission
 from gcsplan.mavlink.build.multirotor import acceptance_radius_m, cuts_corners, spaced_out
-from gcsplan.mavlink.build.order import MARGINS, Order
+from gcsplan.mavlink.build.order import MARGINS, Gates, Order
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.mission_file import VehicleRequest
 from gcsplan.planners.problem import PASSED_M, Problem, Progress, Solution, passes_vias
@@ -27,6 +27,8 @@ from gcsplan.world.world import World
 
 __all__ = ["over_one_terrain", "plan_vehicle", "rebuilt"]
 
+GATE_ROUNDS = 3
+"""Times that gates are given their seconds: with a forecast the hours decide how long the flight to a gate may take."""
 COPTER_ATTEMPTS = 4
 """Most plans for one vehicle, each with larger margins than the one before, until the decoded mission passes."""
 
@@ -175,18 +177,39 @@ def rebuilt(
     speed_m_s: float,
     hold_s: float = 0.0,
     gate_utc: tuple[int, int, int] | None = None,
+    depart_s: float = 0.0,
 ) -> VehiclePlan:
     """The same path at another speed, after ``hold_s`` (whole seconds) at the gate: the mission is rebuilt and judged.
 
-    Raises NoMission if the mission then breaks a limit: a hold costs energy and an item.
+    ``depart_s``: when it leaves, after the common start; gates on its way open as many seconds later. Raises NoMission
+    if the mission then breaks a limit: a hold costs energy and an item.
     """
     order = replace(v.order, speed_m_s=speed_m_s, hold_s=0 if gate_utc else round(hold_s), gate_utc=gate_utc)
+    over = widest(brief, [v])
+    if order.gates is not None:
+        order = _opening(replace(v, order=order), over, order.gates, depart_s, v.order.speed_m_s)
     if order == v.order:
         return v
-    mission, verdict = built(widest(brief, [v]), v.request, v.solution, order)
+    mission, verdict = built(over, v.request, v.solution, order)
     if verdict.findings:
         raise unsafe(verdict, v.request.vehicle)
     return replace(v, mission=mission, verdict=verdict, speed_m_s=speed_m_s, order=order)
+
+
+def _opening(v: VehiclePlan, brief: Brief, gates: Gates, depart_s: float, timed_m_s: float | None) -> Order:
+    """The order of a plan with its gates open as soon as the vehicle is surely there, if it leaves ``depart_s`` after
+    the start; ``timed_m_s``: the speed of its verdict."""
+    leaves_s = gates.start_s + depart_s
+    after_s = v.verdict.gates_after_s() if timed_m_s == v.order.speed_m_s else ()
+    for _ in range(GATE_ROUNDS):
+        if len(after_s) == len(gates.at_m):
+            gates = replace(gates, opens_s=tuple(round(leaves_s + s) for s in after_s))
+        order = replace(v.order, gates=replace(gates, leaves_s=leaves_s))
+        found_s = built(brief, v.request, v.solution, order)[1].gates_after_s()
+        if found_s == after_s:
+            break
+        after_s = found_s
+    return order
 
 
 def widest(brief: Brief, plans: Sequence[VehiclePlan]) -> Brief:

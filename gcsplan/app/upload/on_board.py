@@ -124,7 +124,8 @@ def judge_on_board(
             allowed = {o.setting.matters for o in unlike} == {"pace"}
             return Note("parameters_not_judged", allowed=allowed, off=_notes(unlike))
         # Home on board is where the vehicle is now, but the altitudes count from the planned start.
-        flown, tuning = replace(read_back, home=job.mission.home), Tuning.of(values)
+        flown = replace(read_back, home=job.mission.home, leaves_s=job.mission.leaves_s)
+        tuning = Tuning.of(values)
         flies = vehicle if simulated else vehicle_on_board(vehicle, flown, values)
         returns_m = None if simulated else return_on_board_m(values)
         rtl_rel_home_m = job.rtl_rel_home_m if returns_m is None else returns_m

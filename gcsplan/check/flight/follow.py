@@ -47,6 +47,9 @@ from gcsplan.vehicle import Autopilot, Vehicle
 COPTER_CIRCLE_RADIUS_M = 10.0  # ArduCopter CIRCLE_RADIUS, default
 LEAST_CLIMB_M = {Autopilot.ARDUCOPTER: 1.0, Autopilot.PX4: 2.5}  # takeoff_start; MIS_TAKEOFF_ALT, default
 TAKE_OFF_ELSEWHERE_M = 30.0
+DAY_S = 86400.0
+SOME_S = 1.0
+"""A wait until a time of day counts as this many seconds, until it is known how long the flight to it takes."""
 
 
 def follow(
@@ -362,8 +365,19 @@ class _Pilot(Aboard):
         self.direction = None
         if 0 < item.params[0] < math.inf:
             self.add(seq, "loiter", self.at, self.at, hold_s=item.params[0], column=not self.airborne)
+        elif (until_s := self._until_s(item)) is not None:
+            self.add(seq, "loiter", self.at, self.at, hold_s=SOME_S, until_s=until_s)
         else:
             self.flight.not_judged.append(Note("waits_until_time", seq))
+
+    def _until_s(self, item: MissionItem) -> float | None:
+        """Seconds from leaving the ground to an item's time of day; None if that, or the departure, is not known."""
+        hour, minute, second = item.params[1:4]
+        copter = self.autopilot is Autopilot.ARDUCOPTER and self.airborne and self.known
+        given = 0 <= hour < 24 and 0 <= minute < 60 and 0 <= second < 60
+        if not copter or not given or self.mission.leaves_s is None:
+            return None
+        return (3600.0 * hour + 60.0 * minute + second - self.mission.leaves_s) % DAY_S
 
     def _lose(self, seq: int, item: MissionItem) -> None:
         self.direction = None

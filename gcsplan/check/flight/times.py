@@ -25,7 +25,7 @@ from gcsplan.world.geodesy.frame import Frame
 from gcsplan.world.terrain.vehicle_terrain import VehicleTerrain
 from gcsplan.world.world import World
 
-__all__ = ["FlightTimes", "Parts", "over_ground", "pace_over_ground"]
+__all__ = ["MODEL_PART", "MODEL_S", "FlightTimes", "Parts", "over_ground", "pace_over_ground", "spare_s"]
 
 TERRAIN_STEP_M = 25.0
 """Longest piece, m, into which a leg that follows the ground is cut."""
@@ -39,6 +39,14 @@ WITHOUT_STOP_M = 1.0
 overlap end this near to each other."""
 
 SLANTS_M = 0.01
+
+MODEL_PART, MODEL_S = 0.005, 0.5
+"""Two models of one motion differ by no more than this part of the time, or by no more than these seconds."""
+
+
+def spare_s(time_s: float) -> float:
+    """The seconds that a vehicle is early at a gate at least, after ``time_s`` of flight by the model."""
+    return max(MODEL_S, MODEL_PART * time_s)
 
 
 @dataclass(frozen=True, eq=False, slots=True)

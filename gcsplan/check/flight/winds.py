@@ -50,6 +50,7 @@ STRETCHES_BESIDE = 2
 PIECE_M, MOST_PIECES = 5.0, 24
 """A leg through a wind that depends on the height is cut into pieces that rise by at most this, at most so many."""
 _TRIED_STEPS = 12
+_LEAST_WAIT_S = 1e-3
 _TIMED_CELLS = 16
 _NO_RUN_M = 1e-6
 _RAYS = 64
@@ -126,6 +127,11 @@ class FlightInWind:
         if agl_of is not None and self.wind.heights == "agl" and (self._cuts > 1).any():
             self._piece_agl_m = _known(agl_of(parts.start, parts.end))
         self._still_s = times.seconds()
+        self._waits = np.array([s.until_s is not None for s in stretches], dtype=np.bool_)
+        # The last stretch before, or at, each that ends at a time of day; and that time.
+        self._gate = np.maximum.accumulate(np.where(self._waits, np.arange(len(stretches)), -1))
+        until_s = np.array([s.until_s or 0.0 for s in stretches])
+        self._opened_s = np.where(self._gate >= 0, until_s[self._gate], 0.0)
 
     @cached_property
     def too_windy(self) -> TooWindy | None:
@@ -155,18 +161,18 @@ class FlightInWind:
         """
         if self.too_windy is not None:
             return None
-        found = self._timed[0]
-        return TimeWindow(found.earliest_s, found.latest_s + self.flies_in.late_s)
+        found, late_s = self._timed[0], np.where(self._gate < 0, self.flies_in.late_s, 0.0)
+        return TimeWindow(found.earliest_s + self._opened_s, found.latest_s + self._opened_s + late_s)
 
     @cached_property
     def _timed(self) -> tuple[TimeWindow, Floats]:
-        """The window, and the hours (P, 2) in which each part is flown."""
+        """The window since the departure or the last gate, and the hours (P, 2) in which each part is flown."""
         hours_s = self._any_hour
         found = self._windowed(hours_s)
         if len(self.wind.times_s) > 1 and not (self._rounds > 1.0).any():
             of = self._parts.stretch
-            begins = np.append(0.0, found.earliest_s[:-1])
-            hours_s = np.column_stack([begins[of], found.latest_s[of]]) + self._departs_s
+            begins = np.append(0.0, (found.earliest_s + self._opened_s)[:-1])
+            hours_s = np.column_stack([begins[of], (found.latest_s + self._opened_s)[of]]) + self._departs_s
             found = self._windowed(hours_s)
         return found, hours_s
 
@@ -201,17 +207,23 @@ class FlightInWind:
             fastest = self.between(self._ability.most_m_s, self._ability.most_m_s).earliest_s
             earliest_s = np.maximum(earliest_s, np.minimum(found.earliest_s, fastest))
         hold = np.array([0.0 if math.isinf(s.hold_s) else s.hold_s for s in self.stretches])
-        still_s = np.cumsum((self._still_s + hold) * self._rounds)
+        hold[self._waits] = 0.0
+        still_s = self._since_gate(np.cumsum((self._still_s + hold) * self._rounds))
         least_s, most_s = self._held_s
         rises, falls = (self._nearby(np.maximum(rate, 0.0)) for rate in (found.slower, found.faster))
-        gusts_s = np.diff(late_s, prepend=0.0) + np.diff(early_s, prepend=0.0)
+        gusts_s = self._steps(late_s) + self._steps(early_s)
         beside = np.maximum(self._uneven_s, np.maximum(np.roll(self._uneven_s, 1), np.roll(self._uneven_s, -1)))
         loose_s = gusts_s + np.where((rises + falls).any(axis=0), beside, 0.0)
         loose_s += np.abs(least_s - hold) + np.abs(most_s - hold)
-        return Drift(
-            np.array([s.seq for s in self.stretches], dtype=np.intp), earliest_s - still_s,
-            found.latest_s + late_s - still_s, rises, falls, loose_s,
-        )  # fmt: skip
+        early, late = earliest_s - still_s, found.latest_s + late_s - still_s
+        for k in np.flatnonzero(self._waits).tolist():  # waiting makes up for the drift, second by second
+            early[:, k] = late[:, k] = loose_s[k] = 0.0
+            hold_s = max(self.stretches[k].hold_s, _LEAST_WAIT_S)
+            rises[:, k], falls[:, k] = (
+                np.maximum(-early[:, k - 1], 0.0) / hold_s,
+                np.maximum(late[:, k - 1], 0.0) / hold_s,
+            )
+        return Drift(np.array([s.seq for s in self.stretches], dtype=np.intp), early, late, rises, falls, loose_s)
 
     @cached_property
     def keeps_part(self) -> float:
@@ -262,7 +274,7 @@ class FlightInWind:
         slow, _ = self.even_m_s(slows.min(axis=0), slows.max(axis=0))
         moving_s = self._moving_s(slow)
         late_s, _ = self._gust_s(along, self.between(slow, slow).latest_s)
-        later_s = np.diff(late_s, prepend=0.0) / self._rounds
+        later_s = self._steps(late_s) / self._rounds
         stretch, count = self._parts.stretch, len(self.stretches)
         air_m = most(
             np.array([np.bincount(stretch, weights=w, minlength=count) for w in self._run_m * np.maximum(air, 1.0)])
@@ -278,7 +290,11 @@ class FlightInWind:
         if self.vehicle.energy.base_w and len(cells) > 1:  # else times cost nothing
             groups = np.array_split(slows, _TIMED_CELLS)
             moving_s = most(np.array([self._moving_s(self.even_m_s(g.min(axis=0), g[0])[0]) for g in groups]))
-        return Costs(air_m + blown_m + later_s * fastest, moving_s + later_s, self._held_s[1], wind_m_s)
+        held_s = self._held_s[1].copy()
+        for k in np.flatnonzero(self._waits).tolist():  # the earlier it comes, the longer it waits
+            assert self.window is not None
+            held_s[k] = max(self._opened_s[k] - float(self.window.earliest_s[k - 1]), 0.0)
+        return Costs(air_m + blown_m + later_s * fastest, moving_s + later_s, held_s, wind_m_s)
 
     def _moving_s(self, slow_m_s: Floats) -> Floats:
         """(N,) the most seconds of each stretch, if no part is flown slower than this, and none earlier than in still
@@ -287,8 +303,10 @@ class FlightInWind:
 
     @cached_property
     def _held_s(self) -> tuple[Floats, Floats]:
-        """(N,) the shortest and the longest hold at the end of each stretch: whole circles take longer in a wind."""
+        """(N,) the shortest and the longest hold at the end of each stretch: whole circles take longer in a wind. Without
+        waits until a time of day, after which times begin anew."""
         hold = np.array([0.0 if math.isinf(s.hold_s) else s.hold_s for s in self.stretches])
+        hold[self._waits] = 0.0
         least, most = hold.copy(), hold.copy()
         slowest_m_s = 0.0 if self.wind.varying else float(self.wind.speed_m_s[..., 0].min())
         for i, s in enumerate(self.stretches):
@@ -300,7 +318,18 @@ class FlightInWind:
                 most[i] *= circle_ratio(self.wind.most_m_s, float(bounds[0][0]), own)
         return least, most
 
+    def _since_gate(self, total: Floats) -> Floats:
+        """(..., N) sums up to the end of each stretch, from the departure or from the last gate on."""
+        return total if (self._gate < 0).all() else total - np.where(self._gate >= 0, total[..., self._gate], 0.0)
+
+    def _steps(self, since_gate: Floats) -> Floats:
+        """(N,) what each stretch adds to sums since the last gate."""
+        steps = np.diff(since_gate, prepend=0.0)
+        steps[self._waits] = 0.0
+        return steps
+
     # -- a `FlightClock`, whose points are the ends of the stretches, with holds and rounds --------------------------
+    # All of it counts from the departure, or from the last gate on.
 
     @property
     def run_m(self) -> Floats:
@@ -309,6 +338,9 @@ class FlightInWind:
 
     def summed(self, seconds: Floats) -> Floats:
         """(..., N) the sums of seconds of parts (..., P) up to the end of each stretch."""
+        return self._since_gate(self._totals(seconds))
+
+    def _totals(self, seconds: Floats) -> Floats:
         upto = np.searchsorted(self._parts.stretch, np.arange(len(self.stretches)), side="right")
         sums = np.cumsum(seconds * self._rounds[self._parts.stretch], axis=-1)
         return np.concatenate([np.zeros((*sums.shape[:-1], 1)), sums], axis=-1)[..., upto]
@@ -318,9 +350,10 @@ class FlightInWind:
         speeds up and brakes."""
         per_m_s = (COUPLED_SMOOTH if self.vehicle.smooths else COUPLED) / self.vehicle.accel_m_s2
         least_s, most_s = self._held_s
-        joints_s = self.summed((fast_m_s - slow_m_s) * per_m_s / np.repeat(self._cuts, self._cuts))
-        joints_s = np.append(joints_s[1:], joints_s[-1:])  # the joint to the next stretch
-        return joints_s + np.cumsum((most_s - least_s + 2.0 * self._uneven_s) * self._rounds)
+        joints_s = self._totals((fast_m_s - slow_m_s) * per_m_s / np.repeat(self._cuts, self._cuts))
+        after_s = np.append(joints_s[1:], joints_s[-1:])  # the joint to the next stretch
+        begun_s = np.where(self._gate >= 0, joints_s[self._gate], 0.0)
+        return after_s - begun_s + self._since_gate(np.cumsum((most_s - least_s + 2.0 * self._uneven_s) * self._rounds))
 
     def even_m_s(self, slow_m_s: Floats, fast_m_s: Floats) -> tuple[Floats, Floats]:
         """(..., P) the lowest and the highest speed of all pieces of each part's leg."""
@@ -346,7 +379,8 @@ class FlightInWind:
                 differ | np.append(differ[1:], False) | np.append(False, differ[:-1]), self._uneven_s, 0.0
             )
             latest, earliest = latest + uneven_s, np.maximum(self._seconds(fast_m_s) - uneven_s, 0.0)
-        return TimeWindow(np.cumsum((earliest + least_s) * self._rounds), np.cumsum((latest + most_s) * self._rounds))
+        totals = ((earliest + least_s) * self._rounds, (latest + most_s) * self._rounds)
+        return TimeWindow(*(self._since_gate(np.cumsum(total)) for total in totals))
 
     @cached_property
     def _rounds(self) -> Floats:
@@ -395,7 +429,8 @@ class FlightInWind:
         drifts = latest_s / tau
         moved_m = add_m_s * tau * np.sqrt(2.0 * np.maximum(drifts - 1.0 + np.exp(-drifts), 0.0))
         early_s = np.maximum.accumulate(per_m_s) * moved_m
-        return early_s + np.cumsum(np.diff(latest_s, prepend=0.0) * per_m_s * lost_m_s), early_s
+        lost_s = self._since_gate(np.cumsum(self._steps(latest_s) * per_m_s * lost_m_s))
+        return early_s + lost_s, early_s
 
     def _gust_air_m(self, seconds: Floats) -> Floats:
         """(N,) metres that gusts add to a multicopter's way through the air: how far they may carry it on the whole,

@@ -27,7 +27,8 @@ class Stretch:
     ``rates_m_s``: of climb and descent; None: the vehicle's own. ``times``: how often it is flown, because a jump leads
     back. ``jumped_from``: the jump that led to it, for the first stretch after a jump. ``steep``: for a chord of a
     curve, the curve's steepest rise over run, up and down (negative); None: the stretch is flown straight. ``turns``:
-    its hold is of whole circles, not of seconds.
+    its hold is of whole circles, not of seconds. ``until_s``: its hold ends at a time of day, so many seconds after
+    the vehicle has left the ground; how long it holds is known when it is known how long it flies.
     """
 
     seq: int
@@ -46,6 +47,7 @@ class Stretch:
     jumped_from: int | None = None
     steep: tuple[float, float] | None = None
     turns: bool = False
+    until_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

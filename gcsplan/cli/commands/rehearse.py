@@ -188,7 +188,7 @@ def _show(planned: Plan, result: Rehearsal, units: Units) -> None:
 
 def _ending(result: Rehearsal, units: Units) -> list[str]:
     """Order, intervals, separation and violations in words."""
-    from gcsplan.sim.outcome import WINDOW_S
+    from gcsplan.check.flight.times import MODEL_S
 
     lines = []
     kept = f" in {result.order_kept_runs} of {result.runs} runs" if result.runs > 1 else ""
@@ -196,7 +196,7 @@ def _ending(result: Rehearsal, units: Units) -> list[str]:
         lines.append(f"order of arrival {', '.join(result.terms.order)}: kept{kept}")
     if result.interval_error_s is not None:
         off_s, runs = result.interval_error_s, f" in {result.intervals_kept_runs} of {result.runs} runs"
-        allowed = f"intervals between arrivals within {result.terms.window_s + WINDOW_S:g} s of the plan"
+        allowed = f"intervals between arrivals within {result.terms.window_s + MODEL_S:g} s of the plan"
         off = f"the worst is {abs(off_s):.1f} s too {'long' if off_s > 0.0 else 'short'}"
         kept = f"kept{runs if result.runs > 1 else ''}" if result.intervals_kept_runs else "not kept"
         lines.append(f"{allowed}: {kept}; {off if math.isfinite(off_s) else 'one never arrived'}")

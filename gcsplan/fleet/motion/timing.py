@@ -175,7 +175,8 @@ class Route:
     (N,) are seconds of holding at each point; the first is the gate. ``items`` (N + 1,) are the caller's numbers of the
     take-off, of each way point but the first, and of the end of the flight; legs with the same number are parts of one
     leg. ``pace`` (N,) is the speed over ground that results from a commanded speed of 1 on each leg, and last on the
-    straight line home. ``follows``: its legs follow the ground.
+    straight line home. ``follows``: its legs follow the ground. ``hold_items`` (N,): the caller's numbers of the
+    holds; None: the numbers of the legs before them.
 
     A fixed wing has no columns: ``climb_out`` (K, 3) leads from the ground to the first point, ``glide`` (K, 3) from
     the last point down to the ground if it lands. After a return it circles over home and stays in the air.
@@ -195,6 +196,7 @@ class Route:
     glide: Floats | None = None
     pace: Floats | None = None
     follows: bool = False
+    hold_items: Indices | None = None
 
     def __post_init__(self) -> None:
         p = self.points
@@ -295,7 +297,7 @@ class Course:
         motion.wait(self.gate_s + hold_s, 0)
         for stretch, held in self.to_goal:
             motion.go(stretch, speed_m_s, error_m)
-            motion.wait(held, int(stretch.owner[-1]))
+            motion.wait(held, int(stretch.owner[-1]) + (0 if route.hold_items is None else len(route.points) + 1))
         arrive_s = motion.now_s
         if self.after:
             motion.wait(self.goal_s, len(route.points) - 1)
@@ -377,7 +379,9 @@ class _Motion:
         keep[-1] = True
         if times[-1] - times[keep][-2] <= _LEAST_S:  # keep the last point, drop one that is almost at the same time
             keep[np.flatnonzero(keep)[-2]] = False
-        items = np.full(len(legs_), -1, dtype=np.intp) if route.items is None else route.items[legs_]
+        items = np.full(len(legs_), -1, dtype=np.intp)
+        if route.items is not None:
+            items = np.append(route.items, [] if route.hold_items is None else route.hold_items).astype(np.intp)[legs_]
         stays = route.end == "loiter" or (route.end == "rtl" and route.climb_out is not None)
         return TimedPath(route.name, times[keep], points[keep], arrive_s, stays, items[keep[1:]])
 

@@ -8,6 +8,7 @@ that it does not matter which of the two an autopilot flies.
 from __future__ import annotations
 
 import math
+from datetime import UTC, datetime
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
 from gcsplan.mavlink.build.fixed_wing import build_wing
-from gcsplan.mavlink.build.order import Order, most_cm, split_legs, whole_cm
+from gcsplan.mavlink.build.order import Order, most_cm, split_legs, whole_cm, with_gates
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.autopilots import altitude_of_cm
@@ -75,7 +76,11 @@ def build_mission(path: Path, world: World, vehicle: Vehicle, home_deg: tuple[fl
                 "a larger DEM, or another altitude_frame"
             )
         points = np.column_stack([points[:, :2], points[:, 2] - ground])
-    points = split_legs(points, world, order.bow_m)
+    points, opens = split_legs(points, world, order.bow_m), {}
+    gates = order.gates
+    if gates is not None:
+        points, rows = with_gates(points, gates.at_m)
+        opens = dict(zip(rows, gates.opens_s, strict=True))
     places = world.frame.to_degrees(points[:, 0], points[:, 1])
     lat_e7 = np.rint(places[:, 0] * 1e7).astype(int)
     lon_e7 = np.rint(places[:, 1] * 1e7).astype(int)
@@ -107,7 +112,11 @@ def build_mission(path: Path, world: World, vehicle: Vehicle, home_deg: tuple[fl
     if order.hold_s > 0 or order.gate_utc is not None:  # right after take-off: a gate is exact from a standstill
         items.insert(1, _gate(order, vehicle))
     last = len(points) - 1
-    items += [item(cmd.WAYPOINT, i, frame, int(cm[i]), radius_m=radius) for i in range(1, last)]
+    for i in range(1, last):
+        items.append(item(cmd.WAYPOINT, i, frame, int(cm[i]), radius_m=radius))
+        if i in opens:
+            at = datetime.fromtimestamp(opens[i], UTC)
+            items.append(_until((at.hour, at.minute, at.second), vehicle))
     if order.end == "loiter":
         items.append(item(cmd.LOITER_UNLIM, last, frame, int(cm[last])))
     else:
@@ -121,7 +130,8 @@ def build_mission(path: Path, world: World, vehicle: Vehicle, home_deg: tuple[fl
         items.append(MissionItem(cmd.DO_RETURN_PATH_START, m.NO_POSITION))
         items += [item(cmd.WAYPOINT, i, frame, int(cm[i]), radius_m=radius) for i in range(last, -1, -1)]
         items.append(item(cmd.LAND, 0, m.RELATIVE, 0))
-    return Mission(vehicle.autopilot, home, tuple(items), vehicle.name, vehicle.sysid)
+    leaves_s = None if gates is None else gates.leaves_s
+    return Mission(vehicle.autopilot, home, tuple(items), vehicle.name, vehicle.sysid, leaves_s)
 
 
 def _pad_cm(world: World, above: MissionItem, datum: float, vehicle: Vehicle) -> int:
@@ -138,11 +148,18 @@ def _pad_cm(world: World, above: MissionItem, datum: float, vehicle: Vehicle) ->
 
 
 def _gate(order: Order, vehicle: Vehicle) -> MissionItem:
-    if not vehicle.can_hold or (order.gate_utc is not None and vehicle.autopilot is not Autopilot.ARDUCOPTER):
+    if order.gate_utc is not None:
+        return _until(order.gate_utc, vehicle)
+    if not vehicle.can_hold:
         raise ValueError(f"{vehicle.name} cannot wait so in the air: {vehicle.autopilot} goes on at once")
-    if order.gate_utc is None:
-        return MissionItem(cmd.DELAY, m.NO_POSITION, (float(order.hold_s), -1.0, -1.0, -1.0))
-    hour, minute, second = order.gate_utc
+    return MissionItem(cmd.DELAY, m.NO_POSITION, (float(order.hold_s), -1.0, -1.0, -1.0))
+
+
+def _until(time_of_day: tuple[int, int, int], vehicle: Vehicle) -> MissionItem:
+    """The item that waits until hour, minute and second UTC."""
+    if vehicle.autopilot is not Autopilot.ARDUCOPTER:
+        raise ValueError(f"{vehicle.name} cannot wait so in the air: {vehicle.autopilot} goes on at once")
+    hour, minute, second = time_of_day
     return MissionItem(cmd.DELAY, m.NO_POSITION, (-1.0, float(hour), float(minute), float(second)))
 
 

@@ -79,6 +79,20 @@ class Wing:
 
 
 @dataclass(frozen=True, slots=True)
+class Gates:
+    """The places on its way at which a vehicle waits until a time of day; only ArduCopter can.
+
+    ``at_m`` (K): metres over ground from the begin of its path, rising. ``opens_s`` (K): when each opens, seconds UTC
+    since 1970. ``leaves_s``: when it leaves the ground; ``start_s``: the fleet's common start.
+    """
+
+    at_m: tuple[float, ...]
+    opens_s: tuple[int, ...]
+    leaves_s: float
+    start_s: float
+
+
+@dataclass(frozen=True, slots=True)
 class Order:
     """The requested mission around a path; ``speed_m_s`` None means the fastest cruise.
 
@@ -89,6 +103,7 @@ class Order:
     fixed wing's mission, None for aircraft that can hover. ``return_path``: behind the end, add a return path back
     along the track to a landing at home, to which ArduCopter returns by Auto RTL. ``exact``: places (east_m, north_m)
     whose altitude the mission file gives: it is the nearest centimetre, even where a leg beside it gets too steep.
+    ``gates``: places on the way at which it waits until a time of day.
     """
 
     end: MissionEnd = "land"
@@ -101,6 +116,27 @@ class Order:
     return_path: bool = False
     bow_m: float = LEG_BOW_M
     exact: tuple[tuple[float, float], ...] = ()
+    gates: Gates | None = None
+
+
+GATE_APART_M = 10.0
+"""Metres from a way point below which a gate is at that way point, not at one of its own."""
+
+
+def with_gates(points: Floats, at_m: tuple[float, ...]) -> tuple[Floats, list[int]]:
+    """Points (N, 3) with way points for gates at metres over ground from the first; and which of them are gates.
+
+    A gate within `GATE_APART_M` of an inner way point is at that one.
+    """
+    for metres in at_m:
+        along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points[:, :2], axis=0).T))])
+        if len(points) > 2 and np.abs(along[1:-1] - metres).min() < GATE_APART_M:
+            continue
+        k = int(np.clip(np.searchsorted(along, metres), 1, len(points) - 1))
+        part = (metres - along[k - 1]) / (along[k] - along[k - 1])
+        points = np.insert(points, k, points[k - 1] + part * (points[k] - points[k - 1]), axis=0)
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points[:, :2], axis=0).T))])
+    return points, [1 + int(np.abs(along[1:-1] - metres).argmin()) for metres in at_m]
 
 
 def split_legs(points: Floats, world: World, most_bow_m: float = LEG_BOW_M) -> Floats:

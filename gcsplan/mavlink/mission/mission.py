@@ -130,13 +130,18 @@ class Home:
 
 @dataclass(frozen=True, slots=True)
 class Mission:
-    """The mission of one vehicle. ``items`` exclude home. ``name`` is the vehicle's."""
+    """The mission of one vehicle. ``items`` exclude home. ``name`` is the vehicle's.
+
+    ``leaves_s``: when it leaves the ground, seconds UTC since 1970, from which waits until a time of day count; None:
+    not known.
+    """
 
     autopilot: Autopilot
     home: Home
     items: tuple[MissionItem, ...]
     name: str = ""
     sysid: int = 1
+    leaves_s: float | None = None
 
     def __repr__(self) -> str:
         return f"<Mission {self.name!r} for {self.autopilot}, system {self.sysid}: {len(self.wire_items())} items>"

@@ -345,6 +345,30 @@ def _order_form(value: Any) -> Any:
 _Order = Annotated[Annotated[Literal["best"], Tag("one")] | Annotated[list[str], Tag("several")], Discriminator(_count)]
 
 
+MOST_GATES = 20
+"""Most gates of a vehicle."""
+
+
+def _gates_kind(value: Any) -> str:
+    return "places" if isinstance(value, list) else "auto" if isinstance(value, str) else "count"
+
+
+def _gates_form(value: Any) -> Any:
+    if isinstance(value, list):
+        return in_own_brackets(value)
+    if value is not None and value != "auto" and (isinstance(value, bool) or not isinstance(value, int)):
+        raise ValueError(f"must be auto, a number of gates, or a list of places, given {shown(value)}")
+    return value
+
+
+_Gates = Annotated[
+    Annotated[Literal["auto"], Tag("auto")]
+    | Annotated[Annotated[int, Field(ge=1, le=MOST_GATES)], Tag("count")]
+    | Annotated[Annotated[list[Point], Field(min_length=1, max_length=MOST_GATES)], Tag("places")],
+    Discriminator(_gates_kind),
+]
+
+
 class ArrivalKeys(Keys):
     """``arrival:``."""
 
@@ -366,6 +390,8 @@ class ArrivalKeys(Keys):
     """Time after a landing at which the pad is free again; if absent, never."""
     separation_m: Length | None = None
     """Least distance between any two vehicles, from take-off to landing."""
+    gates: Annotated[_Gates | None, BeforeValidator(_gates_form)] = None
+    """How many times each ArduCopter waits on its way until a second of the day: `auto`, a number, or a list of places."""
     leave_out: bool = False
     """Whether a vehicle without a mission is left out, by name, and the others planned; otherwise it refuses all."""
 

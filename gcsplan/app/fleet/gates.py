@@ -1,0 +1,139 @@
+"""Gates on the way: way points at which copters wait until a second of the day, after which their times begin anew.
+
+NAV_DELAY with hour, minute and second UTC holds no date: a vehicle that comes a moment too late waits for nearly a day.
+So a gate opens after the latest second at which its vehicle may be there in the declared winds, which the check of the
+mission proves again. In the air only ArduCopter waits so: ArduPlane goes on at once while it is armed
+(`verify_nav_delay`), and PX4 reads the seconds alone, of which a time of day has none (`get_time_inside`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from datetime import datetime
+from typing import Literal
+
+import numpy as np
+
+from gcsplan.app.plan.model import Brief, VehiclePlan
+from gcsplan.app.plan.problem import built
+from gcsplan.app.plan.vehicle import rebuilt
+from gcsplan.arrays import Floats
+from gcsplan.errors import InputError, NoMission
+from gcsplan.fleet.arrival import Slot
+from gcsplan.mavlink.build.order import Gates
+from gcsplan.mission_file.request import GatePlaces
+from gcsplan.notes.note import Note
+from gcsplan.vehicle import Autopilot, Vehicle
+
+__all__ = ["WHERE", "counts", "gated", "gates_bought", "no_time_of_day", "waits_for_time"]
+
+WHERE = "arrival.gates"
+MOST_SOUGHT = 8
+"""Most gates that `auto` tries."""
+REACH_M = 100.0
+"""Metres within which a vehicle passes a place, to have a gate beside it."""
+APART_M = 200.0
+"""Least distance of gates on a way from each other, and from its ends, m."""
+GUESS_S = 600
+"""Seconds between gates before it is known how long the flight to them takes."""
+
+GateRequest = int | GatePlaces | Literal["auto"] | None
+
+
+def counts(request: GateRequest) -> Iterator[int | GatePlaces | None]:
+    """The gates to try for a request, in turn."""
+    if request == "auto":
+        yield from (None, *range(1, MOST_SOUGHT + 1))
+    else:
+        yield request
+
+
+def waits_for_time(vehicle: Vehicle) -> bool:
+    """Whether it waits in the air until a time of day."""
+    return vehicle.autopilot is Autopilot.ARDUCOPTER and vehicle.can_hold
+
+
+def no_time_of_day(vehicle: Vehicle) -> Note:
+    """Why a vehicle has no gates."""
+    return Note("no_gates_on_way", autopilot=vehicle.autopilot.value, px4=vehicle.autopilot is Autopilot.PX4)
+
+
+def gated(
+    vehicles: Sequence[VehiclePlan], brief: Brief, gates: int | GatePlaces, start: datetime, most_m_s: dict[str, float]
+) -> list[VehiclePlan]:
+    """The vehicles, those that can wait with gates on their ways, and at no more than their ``most_m_s``.
+
+    Raises InputError if no vehicle has a gate, NoMission if a way is too short for its gates, or breaks a limit.
+    """
+    found, has = [], False
+    for v in vehicles:
+        at_m = _places_m(v, gates) if waits_for_time(v.request.vehicle) else ()
+        has = has or bool(at_m)
+        found.append(_with(v, brief, at_m, start, most_m_s.get(v.name, math.inf)) if at_m else v)
+    if not has:
+        able = [v for v in vehicles if waits_for_time(v.request.vehicle)]
+        why = (
+            f"no vehicle passes within {REACH_M:g} m of a place, {APART_M:g} m from the ends of its way: give other "
+            "places, or how many gates each has"
+            if able
+            else f"{vehicles[0].name} {no_time_of_day(vehicles[0].request.vehicle)}: leave gates out, and give a wider "
+            "window_s"
+        )
+        raise InputError(why, where=WHERE)
+    return found
+
+
+def _with(v: VehiclePlan, brief: Brief, at_m: tuple[float, ...], start: datetime, most_m_s: float) -> VehiclePlan:
+    start_s = start.timestamp()
+    opens_s = tuple(round(start_s) + GUESS_S * (k + 1) for k in range(len(at_m)))
+    v = replace(v, order=replace(v.order, gates=Gates(at_m, opens_s, start_s, start_s)))
+    return rebuilt(v, brief, speed_m_s=min(v.speed_m_s, most_m_s))
+
+
+def _places_m(v: VehiclePlan, gates: int | GatePlaces) -> tuple[float, ...]:
+    """Metres over ground from the begin of the path to each gate."""
+    points = v.solution.path.points[:, :2]
+    along_m = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+    way_m = float(along_m[-1])
+    if isinstance(gates, int):
+        if way_m < APART_M * (gates + 1):
+            most = max(math.floor(way_m / APART_M) - 1, 0)
+            raise NoMission(
+                f"{v.name}: its way of {way_m:.0f} m has room for {most} gates {APART_M:g} m apart, not for {gates}",
+                reason="time",
+            )
+        return tuple(way_m * (k + 1) / (gates + 1) for k in range(gates))
+    found = sorted(at for place in gates if (at := _passed_m(points, along_m, place)) is not None)
+    kept: list[float] = []
+    for at in found:
+        if at - (kept[-1] if kept else 0.0) >= APART_M and way_m - at >= APART_M:
+            kept.append(at)
+    return tuple(kept)
+
+
+def _passed_m(points: Floats, along_m: Floats, place: tuple[float, float]) -> float | None:
+    """Where a way (N, 2) is nearest to a place, metres along it; None if it does not pass it."""
+    a, way = points[:-1], np.diff(points, axis=0)
+    part = np.clip(((np.array(place) - a) * way).sum(axis=1) / np.maximum((way**2).sum(axis=1), 1e-12), 0.0, 1.0)
+    off_m = np.hypot(*(a + part[:, None] * way - place).T)
+    leg = int(off_m.argmin())
+    return float(along_m[leg] + part[leg] * np.diff(along_m)[leg]) if off_m[leg] <= REACH_M else None
+
+
+def gates_bought(v: VehiclePlan, slot: Slot, brief: Brief) -> VehiclePlan:
+    """A vehicle with a note on what its gates cost and buy; itself if it has none."""
+    if v.order.gates is None:
+        return v
+    waits = [leg for leg in v.verdict.legs if leg.until_s is not None]
+    without = built(brief, v.request, v.solution, replace(v.order, gates=None))[1]
+    after, before = v.verdict.arrive_window_s(slot), without.arrive_window_s()
+    takes_j = v.verdict.reported_j(math.fsum(leg.hold_j for leg in waits))
+    note = Note(
+        "waits_at_gates", count=len(waits), wait_s=math.fsum(leg.hold_s for leg in waits),
+        energy=None if takes_j is None else Note("gates_take", energy_j=takes_j),
+        width_s=0.0 if after is None else after[1] - after[0],
+        without_s=0.0 if before is None else before[1] - before[0],
+    )  # fmt: skip
+    return replace(v, notes=(*v.notes, note))
