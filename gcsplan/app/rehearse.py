@@ -241,6 +241,11 @@ def rehearse_in_sitl(
     from gcsplan.sim.sitl.instances import SPEEDUP, sitl_instances
 
     parts, seats = parts_of(planned), dict(addresses or {})
+    if any(part.mission.leaves_s is not None for part in parts):
+        raise UsageError(
+            "gates on the way open at times of the day, which a simulator at its own pace does not keep: rehearse "
+            "without --sitl, or without arrival.gates"
+        )
     if not i_know:
         require_here(list(seats.values()))
     without = [p for p in parts if p.vehicle.name not in seats] if binary is not None else []

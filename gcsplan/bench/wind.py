@@ -16,6 +16,7 @@ import json
 import math
 from collections import Counter
 from collections.abc import Callable, Sequence
+from datetime import UTC, datetime
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -44,6 +45,9 @@ FORECAST_HOURS = [f"2026-11-28T{hour:02d}:00" for hour in range(9, 15)]
 FORECAST_AGL_M = 10, 80, 120
 BATTERY_J = 1e7
 RUNS_OF_FLEET = 5
+GATES = (1, 2, 3, "auto")
+START = datetime(2026, 11, 28, 10, 0, 0, tzinfo=UTC)
+"""The common start of a fleet with gates, which is within the forecasts."""
 LANES_APART_DEG = 0.008
 """Distance of the starts, and of the goals, of neighbours in a fleet: 710 m or more, as wings circle at their goals."""
 ENERGY_SLACK = 1.002
@@ -96,7 +100,7 @@ def run_fleets(fleets: int, *, seed: int = 1, tell: Callable[[str], None] | None
     for number in range(1, fleets + 1):
         with TemporaryDirectory() as folder:
             kind, document = fleet_of(seed, number, Path(folder))
-            planned = _planned(document, refused)
+            planned = _planned(document, refused, START if "gates" in document["arrival"] else None)
         if planned is None:
             continue
         weather = weather_of(planned.source, None, None, 0.0, 0.0)
@@ -120,10 +124,10 @@ def run_fleets(fleets: int, *, seed: int = 1, tell: Callable[[str], None] | None
     }  # fmt: skip
 
 
-def _planned(document: dict[str, Any], refused: Counter[str]) -> Plan | None:
-    """The plan of a mission that passes; None, and why, of any other."""
+def _planned(document: dict[str, Any], refused: Counter[str], start: datetime | None = None) -> Plan | None:
+    """The plan of a mission that passes, with a common start or without; None, and why, of any other."""
     try:
-        planned = plan(load_mission(document))
+        planned = plan(load_mission(document, departure=start), gate_utc=start)
     except NoMission as refusal:
         refused[refusal.reason] += 1
         return None
@@ -177,7 +181,10 @@ def mission_of(seed: int, number: int, folder: Path) -> tuple[str, dict[str, Any
 
 
 def fleet_of(seed: int, number: int, folder: Path) -> tuple[str, dict[str, Any]]:
-    """As `mission_of`, of a fleet that arrives in sequence: each flies beside its neighbour, to a goal of its own."""
+    """As `mission_of`, of a fleet that arrives in sequence: each flies beside its neighbour, to a goal of its own.
+
+    In every second fleet copters have gates, and cannot give up speed to keep their times.
+    """
     rng = np.random.default_rng([seed, number, 1])
     kind = WIND_KINDS[number % len(WIND_KINDS)]
     turn, away_m = float(rng.uniform(0.0, 2.0 * math.pi)), float(rng.uniform(2000.0, 4500.0))
@@ -191,6 +198,12 @@ def fleet_of(seed: int, number: int, folder: Path) -> tuple[str, dict[str, Any]]
         "mode": "sequence", "order": "best", "clock": "fleet", "separation_m": 50,
         "interval_s": round(float(rng.uniform(20.0, 60.0))), "window_s": round(float(rng.uniform(2.0, 10.0))),
     }  # fmt: skip
+    copters = [v for v in vehicles if v["autopilot"] == "arducopter"]
+    if number % 2 and copters:
+        kind = f"{kind}, gates"
+        document["arrival"]["gates"] = GATES[int(rng.integers(len(GATES)))]
+        for v in copters:
+            v |= {"speed_m_s": [round(0.95 * v["speed_m_s"][1], 1), v["speed_m_s"][1]], "lean_angle_deg": 30}
     return kind, document
 
 
@@ -315,10 +328,10 @@ def report_fleets(result: dict[str, Any]) -> str:
     lines = [
         f"{flown} of {result['fleets']} fleets were flown, {held} kept everything; of {runs} runs: {kept}; refused: "
         f"{refused}",
-        "winds                fleets  in still air alone  kept all  runs  order  intervals  separation",
+        "winds                      fleets  in still air alone  kept all  runs  order  intervals  separation",
     ]
     lines += [
-        f"{kind:<20}{row['fleets']:>7}{row['in_still_air']:>20}{row['held']:>10}{row['runs']:>6}{row['order']:>7}"
+        f"{kind:<26}{row['fleets']:>7}{row['in_still_air']:>20}{row['held']:>10}{row['runs']:>6}{row['order']:>7}"
         f"{row['intervals']:>11}{row['separation']:>12}"
         for kind, row in result["kinds"].items()
     ]

@@ -52,6 +52,8 @@ MORE_FIGURES = {
     "flight_energy_j": MAYBE_NUMBER, "energy_figures": {"enum": ["own", "paper", None]}, "verdict": TEXT,
     "max_agl_m": MAYBE_NUMBER, "min_zone_height_m": MAYBE_NUMBER, "zone_passed": {"type": ["object", "null"]},
     "arrive_earliest_s": NUMBER, "arrive_latest_s": NUMBER,
+    "gates": listed(an_object({"seq": COUNT, "earliest_s": NUMBER, "latest_s": NUMBER, "opens_s": NUMBER,
+                               "wait_s": NUMBER, "energy_j": MAYBE_NUMBER})),
     "not_judged_data": listed(NOTE), **NOTES, "way_home": an_object({"safe": MAYBE_FLAG}),
 }  # fmt: skip
 VEHICLE_PLAN = an_object(

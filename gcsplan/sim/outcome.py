@@ -53,6 +53,11 @@ class RehearsalPart:
     depart_window_s: float = 0.0
 
     @property
+    def shifted_s(self) -> float:
+        """How much later it arrives because it departs late: nothing where it waits until a time of day."""
+        return 0.0 if any(leg.until_s is not None for leg in self.verdict.legs) else self.late_s
+
+    @property
     def leaves_s(self) -> float:
         """When it departs, seconds since the fleet's common start."""
         return self.depart_s + self.late_s
@@ -165,13 +170,14 @@ class Performance:
     paper_energy: bool = False
     window_s: tuple[float, float] | None = None
     late_s: float = 0.0
+    shifted_s: float = 0.0
 
     @property
     def inside_runs(self) -> int | None:
         """In how many runs it arrived inside its window, of its late departure if that is late; None without one."""
         if self.window_s is None:
             return None
-        came = [a - self.late_s for a in self.arrive_s]
+        came = [a - self.shifted_s for a in self.arrive_s]
         return sum(math.isfinite(a) and not outside_s(self.window_s, self.depart_s, a) for a in came)
 
     @property
@@ -388,7 +394,7 @@ class Tally:
             if (late := lateness(part, trace)) is not None:
                 self.breach("late", (trace.name,), *late)
             if part.window_s is not None and (
-                off_s := outside_s(part.window_s, part.depart_s, trace.arrive_s - part.late_s)
+                off_s := outside_s(part.window_s, part.depart_s, trace.arrive_s - part.shifted_s)
             ):
                 earliest_s, latest_s = (at - part.depart_s for at in part.window_s)
                 outside = Note(
@@ -504,7 +510,7 @@ class Tally:
                     part.vehicle.name, part.depart_s, part.arrive_s, tuple(self._arrive[i]), tuple(self._end[i]),
                     math.nan if low is None else low.min_agl_m, (math.nan, math.nan) if low is None else low.min_agl_at,
                     self._used_percent(part, self.most_j[i]), not_flown[i], part.vehicle.energy.papers,
-                    part.window_s, part.late_s,
+                    part.window_s, part.late_s, part.shifted_s,
                 )
             )  # fmt: skip
         breaches = sorted(self._breaches.values(), key=lambda b: (-b.runs, b.kind, b.vehicles))

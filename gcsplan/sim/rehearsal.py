@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -179,7 +179,10 @@ def on_board(parts: Sequence[RehearsalPart]) -> list[Mission]:
     with SimServer(vehicles, "udpin:127.0.0.1:0") as server, Link(server.url_for_gcs) as link:
         upload_parts(parts, [link] * len(parts))
     return [
-        Mission.from_wire(v.autopilot, v.items(), home=v.home, name=p.mission.name, sysid=v.sysid)
+        replace(
+            Mission.from_wire(v.autopilot, v.items(), home=v.home, name=p.mission.name, sysid=v.sysid),
+            leaves_s=p.mission.leaves_s,
+        )
         for v, p in zip(vehicles, parts, strict=True)
     ]
 
@@ -204,7 +207,7 @@ def track_of(part: RehearsalPart, mission: Mission, world: World, airspeed_m_s: 
     try:
         return make_track(
             mission, part.vehicle, world, Kinematics.of(part.vehicle, airspeed_m_s), rtl_rel_home_m=part.rtl_rel_home_m,
-            airborne=part.airborne,
+            airborne=part.airborne, depart_s=part.depart_s,
         )  # fmt: skip
     except ValueError as error:
         if isinstance(error, InputError):

@@ -15,18 +15,23 @@ from itertools import combinations
 from tests.oracles.wind import Share, Winds
 
 STEP_M, SAMPLE_S = 40.0, 0.25
+OPENS_S, DAY_S = 1e-3, 86400.0
 Place = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
 class Flyer:
-    """A motion in still air: ``times_s`` at ``places``. ``air_m_s``: a copter's largest airspeed; None for a wing."""
+    """A motion in still air: ``times_s`` at ``places``. ``air_m_s``: a copter's largest airspeed; None for a wing.
+
+    ``opens_s``: when its gates open. It stands at each, in still air until then.
+    """
 
     name: str
     times_s: Sequence[float]
     places: Sequence[Place]
     arrive_s: float
     air_m_s: float | None = None
+    opens_s: Sequence[float] = ()
 
 
 @dataclass(frozen=True)
@@ -58,6 +63,11 @@ def flown(flyer: Flyer, winds: Winds, share_of: Callable[[int], Share], ground_m
     for k in range(1, len(flyer.times_s)):
         a, b = flyer.places[k - 1], flyer.places[k]
         still_s = flyer.times_s[k] - flyer.times_s[k - 1]
+        opens = [at for at in flyer.opens_s if abs(at - flyer.times_s[k]) < OPENS_S and a == b]
+        if opens:  # the gate holds no date: one that comes too late goes on the next day
+            times.append(clock := opens[0] + (DAY_S if clock > opens[0] else 0.0))
+            places.append(b)
+            continue
         level_m, whole_m = math.dist(a[:2], b[:2]), math.dist(a, b)
         parts = max(1, math.ceil(level_m / STEP_M))
         for i in range(parts):

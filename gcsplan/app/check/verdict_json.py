@@ -30,6 +30,7 @@ def verdict_of(name: str, verdict: Verdict, home: WayHome | None = None, wording
         "min_agl_m": lowest.min_agl_m if lowest else None,
         **extremes(verdict),
         **arrival_window(verdict),
+        **gates_on_way(verdict),
         "violations": [f.as_dict(wording) for f in verdict.findings],
         **in_json("not_judged", verdict.not_judged, wording),
         **in_json("notes", verdict.notes, wording),
@@ -53,6 +54,23 @@ def arrival_window(verdict: Verdict, slot: Slot | None = None) -> dict[str, floa
     """The earliest and the latest arrival in the declared winds; nothing in still air."""
     window_s = verdict.arrive_window_s(slot)
     return {} if window_s is None else dict(zip(("arrive_earliest_s", "arrive_latest_s"), window_s, strict=True))
+
+
+def gates_on_way(verdict: Verdict, slot: Slot | None = None) -> dict[str, Any]:
+    """Each wait until a time of day; nothing if there is none. Seconds count as the windows of arrival."""
+    ends, windows = verdict.clock_s(slot), verdict.leg_windows_s(slot)
+    waits = [k for k, leg in enumerate(verdict.legs) if leg.until_s is not None]
+    if not waits:
+        return {}
+    rows = []
+    for k in waits:
+        leg = verdict.legs[k]
+        early_s, late_s = (ends[k - 1], ends[k - 1]) if windows is None else windows[k - 1]
+        rows.append({
+            "seq": leg.seq, "earliest_s": early_s, "latest_s": late_s, "opens_s": ends[k], "wait_s": leg.hold_s,
+            "energy_j": verdict.reported_j(leg.hold_j),
+        })  # fmt: skip
+    return {"gates": rows}
 
 
 def flat(figures: Any) -> dict[str, Any]:

@@ -171,7 +171,7 @@ def fleet_of(
         speeds = steadier(tried, terms.source.arrival.hold)
         for gates in counts(None if request == "auto" and gate is None else request):
             for pace in ({}, speeds) if speeds else ({},):
-                start = gate if gates is None else gate or GateTime(ANY_START)
+                start = gate if gates is None else gate or GateTime(brief.source.departure or ANY_START)
                 try:
                     return _fleet_of(tried, _having(terms, gates), start, LeavingOut(allowed=False), pace)
                 except NoMission as why:
@@ -216,12 +216,14 @@ def _fleet_of(
     gates = None if arrival is None or gate is None else arrival.gates
     common, gate_times = gate, None if gates else gate
 
-    def on_way(some: Sequence[VehiclePlan]) -> list[VehiclePlan]:
+    def on_way(some: Sequence[VehiclePlan], leaving: LeavingOut) -> list[VehiclePlan]:
         if not gates or common is None or gates == "auto":
             return list(some)
-        return gated(some, brief, gates, common.start, {name: pace.most_m_s for name, pace in speeds.items()})
+        most_m_s = {name: pace.most_m_s for name, pace in speeds.items()}
+        return gated(some, brief, gates, common.start, most_m_s, leaving)
 
-    vehicles = on_way(vehicles)
+    vehicles = on_way(vehicles, leaving)
+    waiting = {v.name for v in vehicles if v.order.gates is not None}
     crews = [_paced(crew_of(v, world), _pace_of(v, speeds)) for v in vehicles]
     notes: list[Note] = []
     requested = None
@@ -230,7 +232,7 @@ def _fleet_of(
     else:
         detours = Detours(
             vehicles, brief, rules_of(arrival, vehicles, world), lambda v: route_of(v, world),
-            lambda v: on_way([v])[0] if waits_for_time(v.request.vehicle) else v,
+            lambda v: on_way([v], LeavingOut(allowed=False))[0] if v.name in waiting else v,
         )  # fmt: skip
         requested, notes = _scheduled(crews, arrival, detours, leaving)
         plan = requested
@@ -393,9 +395,7 @@ def _timed(
     for v, slot, opens_s in zip(vehicles, slots, opens, strict=True):
         at = None if gate is None or opens_s is None else gate.of_day(opens_s)
         try:
-            made = rebuilt(
-                v, brief, speed_m_s=slot.speed_m_s, hold_s=slot.hold_s, gate_utc=at, depart_s=slot.depart_s
-            )
+            made = rebuilt(v, brief, speed_m_s=slot.speed_m_s, hold_s=slot.hold_s, gate_utc=at, depart_s=slot.depart_s)
         except NoMission as why:
             leaving.leave(v.name, why)
             continue

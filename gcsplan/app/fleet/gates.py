@@ -9,13 +9,14 @@ mission proves again. In the air only ArduCopter waits so: ArduPlane goes on at 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
 from typing import Literal
 
 import numpy as np
 
+from gcsplan.app.plan.left_out import LeavingOut
 from gcsplan.app.plan.model import Brief, VehiclePlan
 from gcsplan.app.plan.problem import built
 from gcsplan.app.plan.vehicle import rebuilt
@@ -27,7 +28,7 @@ from gcsplan.mission_file.request import GatePlaces
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Vehicle
 
-__all__ = ["WHERE", "counts", "gated", "gates_bought", "no_time_of_day", "waits_for_time"]
+__all__ = ["MOST_SOUGHT", "WHERE", "counts", "gated", "gates_bought", "no_time_of_day", "waits_for_time"]
 
 WHERE = "arrival.gates"
 MOST_SOUGHT = 8
@@ -61,18 +62,24 @@ def no_time_of_day(vehicle: Vehicle) -> Note:
 
 
 def gated(
-    vehicles: Sequence[VehiclePlan], brief: Brief, gates: int | GatePlaces, start: datetime, most_m_s: dict[str, float]
-) -> list[VehiclePlan]:
+    vehicles: Sequence[VehiclePlan], brief: Brief, gates: int | GatePlaces, start: datetime,
+    most_m_s: Mapping[str, float], leaving: LeavingOut,
+) -> list[VehiclePlan]:  # fmt: skip
     """The vehicles, those that can wait with gates on their ways, and at no more than their ``most_m_s``.
 
-    Raises InputError if no vehicle has a gate, NoMission if a way is too short for its gates, or breaks a limit.
+    Raises InputError if no vehicle passes a gate. Raises NoMission if a way is too short for its gates, or if its
+    mission then breaks a limit, unless such a vehicle may be left out.
     """
-    found, has = [], False
+    found, passes = [], False
     for v in vehicles:
-        at_m = _places_m(v, gates) if waits_for_time(v.request.vehicle) else ()
-        has = has or bool(at_m)
-        found.append(_with(v, brief, at_m, start, most_m_s.get(v.name, math.inf)) if at_m else v)
-    if not has:
+        try:
+            at_m = _places_m(v, gates) if waits_for_time(v.request.vehicle) else ()
+            passes = passes or bool(at_m)
+            found.append(_with(v, brief, at_m, start, most_m_s.get(v.name, math.inf)) if at_m else v)
+        except NoMission as why:
+            passes = True
+            leaving.leave(v.name, why)
+    if not passes:
         able = [v for v in vehicles if waits_for_time(v.request.vehicle)]
         why = (
             f"no vehicle passes within {REACH_M:g} m of a place, {APART_M:g} m from the ends of its way: give other "

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from gcsplan import __version__
-from gcsplan.app.check.verdict_json import arrival_window, extremes
+from gcsplan.app.check.verdict_json import arrival_window, extremes, gates_on_way
 from gcsplan.app.plan.model import FleetPlan, Plan, VehiclePlan
 from gcsplan.app.upload.on_board import settings_of_plan
 from gcsplan.arrays import Floats
@@ -245,6 +245,7 @@ def _vehicle(
         "depart_s": slot.depart_s if slot else 0.0,
         "arrive_s": slot.arrive_s if slot else verdict.arrive_s,
         **arrival_window(verdict, slot),
+        **gates_on_way(verdict, slot),
         "planning_s": v.solution.planning_s,
         "first_path_s": v.solution.first_path_s,
         "stopped_by": v.solution.stopped_by,

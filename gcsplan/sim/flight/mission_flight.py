@@ -27,6 +27,7 @@ SAMPLE_S = FLIGHT_STEP_S * SAMPLE_STEPS
 """Seconds between recorded samples of the flight."""
 CRAWL_M_S = 0.05
 """Lowest speed in a corner, m/s: a vehicle comes to rest only at a stop."""
+DAY_S = 86400.0
 HEADWAY_M_S = 0.3
 """Lowest speed over ground, m/s, against a wind that is too strong for the vehicle."""
 PATIENCE = 4.0
@@ -149,6 +150,7 @@ class _Ways:
         self.stop_clock = self.clock[last] + took[last]
         self.stop_at = np.concatenate([a[_next_stop(t)] for t, a in zip(tracks, along, strict=True)])
         self.hold = np.concatenate([t.hold_s[_next_stop(t)] for t in tracks])
+        self.until = np.concatenate([t.until_s[_next_stop(t)] for t in tracks])
         # Just before the stop, so that a look-up there finds a piece before the stop.
         self.before_stop = np.nextafter(self.stop_at, -math.inf)
         self.stops_after = self.end >= self.stop_at
@@ -181,6 +183,7 @@ def fly(
     air = Air(weather, tracks, runs, seed, first_run)
     lanes = _Lanes(tracks, ways, np.resize(np.asarray(depart_s, dtype=np.float64), runs * len(tracks)), runs)
     latest_s = max(depart_s) + PATIENCE * ways.calm_s() + PATIENCE_SPARE_S
+    latest_s += max(0.0, float(np.nanmax(ways.until, initial=0.0)))
     times, along, offset = [0.0], [lanes.s.copy()], [air.offset]
     step, through_m = 0, np.zeros(len(lanes.s))
     while not lanes.done.all() and step * FLIGHT_STEP_S < latest_s:
@@ -324,7 +327,9 @@ class _Lanes:
         else:
             took = 2.0 * left_m / v if v > 0.0 else math.sqrt(2.0 * left_m / accel)
         at = since_s + min(took, within_s)
-        node, hold = int(ways.stop_node[k]), float(ways.hold[k])
+        node, hold, until_s = int(ways.stop_node[k]), float(ways.hold[k]), float(ways.until[k])
+        if not math.isnan(until_s):  # one that comes too late waits until the next day
+            hold += (until_s - at) % DAY_S
         if node == self._goal[lane]:
             self.arrive[lane] = at
         self.stops[lane].append((node, at, at + hold))

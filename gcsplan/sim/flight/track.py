@@ -42,7 +42,8 @@ class CommandedTrack:
     """N nodes and the N - 1 straight pieces between them.
 
     ``points`` (N, 3): east_m, north_m, amsl_m. ``hold_s`` (N,): seconds that the vehicle stands at a node, `PASSED` if
-    it does not stop, infinite if it stays. Of the pieces (N - 1,): ``cap_m_s``, the highest speed along it that climb,
+    it does not stop, infinite if it stays. ``until_s`` (N,): the time at which it goes on, seconds since the fleet's
+    common start, where that is a time of day; else NaN. Of the pieces (N - 1,): ``cap_m_s``, the highest speed along it that climb,
     descent and corners allow; ``command_m_s``, the commanded speed over ground; ``level``, the horizontal fraction of
     its length; ``accel_m_s2``; ``airspeed_m_s`` (N - 1, 2), the highest level and on its slope; ``column`` (take-off or
     landing); ``seq``, the wire item. ``ground`` (M, 2): metres along the track, and the ground below, m AMSL. ``goal``:
@@ -53,6 +54,7 @@ class CommandedTrack:
     name: str
     points: Floats
     hold_s: Floats
+    until_s: Floats
     cap_m_s: Floats
     command_m_s: Floats
     level: Floats
@@ -121,7 +123,7 @@ class _Line:
     def __init__(self, start: Floats, *, in_space: bool) -> None:
         self.in_space = in_space
         self.points = [start]
-        self.hold_s = [0.0]
+        self.hold_s, self.until_s = [0.0], [math.nan]
         self.pieces: list[tuple[float, float, float, float, bool, int]] = []
 
     def add(
@@ -144,6 +146,7 @@ class _Line:
         self.pieces.append((cap_m_s, stretch.speed_m_s, level, accel, stretch.column, stretch.seq))
         self.points.append(to)
         self.hold_s.append(PASSED)
+        self.until_s.append(math.nan)
 
     def add_timed(self, to: Floats, stretch: Stretch, seconds: float) -> None:
         """Add a piece to ``to`` that takes this time; its speed changes at once at its ends."""
@@ -153,10 +156,13 @@ class _Line:
         self.pieces.append((length / seconds, stretch.speed_m_s, level, AT_ONCE_M_S2, stretch.column, stretch.seq))
         self.points.append(to)
         self.hold_s.append(PASSED)
+        self.until_s.append(math.nan)
 
-    def stop(self, hold_s: float) -> None:
-        """Stop at the last node for ``hold_s``, in addition to an earlier stop there."""
-        self.hold_s[-1] = max(self.hold_s[-1], 0.0) + hold_s
+    def stop(self, s: Stretch, depart_s: float) -> None:
+        """Stop at the last node for the hold of a stretch, in addition to an earlier stop there."""
+        self.hold_s[-1] = max(self.hold_s[-1], 0.0) + (s.hold_s if s.until_s is None else 0.0)
+        if s.until_s is not None:
+            self.until_s[-1] = depart_s + s.until_s
 
 
 def make_track(
@@ -167,10 +173,11 @@ def make_track(
     *,
     rtl_rel_home_m: float | None = None,
     airborne: bool = False,
+    depart_s: float = 0.0,
 ) -> CommandedTrack:
     """Return the path that ``mission`` (as stored on board) commands ``vehicle`` to fly.
 
-    ``airborne``: it begins at the top of its take-off.
+    ``airborne``: it begins at the top of its take-off. ``depart_s``: when it is planned to leave, after the common start.
 
     ``not_flown`` lists the parts that are not understood or cannot be simulated. Raises ValueError if the mission does
     not fly at all.
@@ -197,13 +204,13 @@ def make_track(
         s = stretches[i]
         if s.column and not (wing and _slants(ends[i])):
             _column(line, ends[i], s, kinematics, home_amsl_m)
-            line.stop(s.hold_s)
+            line.stop(s, depart_s)
         elif _stands(ends[i]):
-            line.stop(s.hold_s)
+            line.stop(s, depart_s)
         else:
             last = _end_of_flight(stretches, i) if wing else _end_of_run(stretches, ends, i)
             _run(line, stretches[i : last + 1], ends[i : last + 1], kinematics, world)
-            line.stop(stretches[last].hold_s)
+            line.stop(stretches[last], depart_s)
             i = last
         if stretches[i].on_path:
             goal = len(line.points) - 1
@@ -232,7 +239,7 @@ def _track(
     if not np.isfinite(points).all():
         raise InputError(f"{name}: the mission follows terrain that the terrain model does not know")
     return CommandedTrack(
-        name, points, np.array(line.hold_s), np.array(cap), np.array(command), np.array(level),
+        name, points, np.array(line.hold_s), np.array(line.until_s), np.array(cap), np.array(command), np.array(level),
         np.array(accel), np.array(column, dtype=np.bool_), np.array(seq, dtype=np.intp), _ground(points, world), goal,
         not (last.column and last.end[2] < last.start[2]), kinematics.slowing_m_s2,
         _airspeeds(points, kinematics),

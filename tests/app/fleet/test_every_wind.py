@@ -12,6 +12,8 @@ import pytest
 from gcsplan import Plan, plan
 from gcsplan.app.output.files import summary_of
 from gcsplan.errors import NoMission
+from gcsplan.mavlink.mission import commands as cmd
+from gcsplan.mavlink.mission.mission import Mission
 from tests.oracles.fleet_wind import Flyer, flown, least_m
 from tests.oracles.wind import Share, Winds, leaning_air_m_s
 
@@ -50,7 +52,19 @@ def flyers(done: Plan) -> list[Flyer]:
         lean = v.request.vehicle.lean_angle_deg
         air_m_s = None if v.request.vehicle.keeps_airspeed else leaning_air_m_s(lean or 30.0, 60.0)
         places = [tuple(p) for p in motion.points.tolist()]
-        found.append(Flyer(v.name, motion.times_s.tolist(), places, motion.arrive_s, air_m_s))
+        found.append(Flyer(v.name, motion.times_s.tolist(), places, motion.arrive_s, air_m_s, opens_s(done, v.mission)))
+    return found
+
+
+def opens_s(done: Plan, mission: Mission) -> list[float]:
+    """When the gates of a mission open, seconds after the common start, from its items alone."""
+    start = done.fleet.start_utc if done.fleet is not None else None
+    found = []
+    for item in mission.items:
+        if item.command == cmd.DELAY and start is not None:
+            hour, minute, second = (int(x) for x in item.params[1:])
+            at = start.replace(hour=hour, minute=minute, second=second)
+            found.append((at - start).total_seconds() % 86400.0)
     return found
 
 
