@@ -147,7 +147,7 @@ def _set_waits(flight: Flight, seconds: Floats) -> None:
 
 
 def _missed_gates(flight: Flight, seconds: Floats, blown: FlightInWind | None) -> list[Finding]:
-    """The findings on gates that the vehicle may reach after their second, for which it would wait until the next day."""
+    """The findings on gates that the vehicle may reach after their second: it would wait there until the next day."""
     found, opened_s, reached_s = [], 0.0, 0.0
     for k, s in enumerate(flight.stretches):
         if s.until_s is None:

@@ -157,8 +157,8 @@ PLAN_TEXTS = {
         "one that comes after its gate's second waits there for nearly a day"
     ),
     "no_gates_on_way": (
-        "has no gates: {autopilot} {px4:reads only the seconds of a wait|does not wait in the air while it is armed}, "
-        "so it goes on at once at a gate with a time of day"
+        "has no gates: {autopilot} {px4:reads only the seconds of a wait|does not wait in the air}, so it goes on at "
+        "once at a gate with a time of day"
     ),
     "waits_at_gates": (
         "waits {wait_s:seconds.0} in all at {count} {count:gate|gates} on its way{energy}; its arrivals in the declared "

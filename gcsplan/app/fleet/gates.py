@@ -65,7 +65,7 @@ def gated(
     vehicles: Sequence[VehiclePlan], brief: Brief, gates: int | GatePlaces, start: datetime,
     most_m_s: Mapping[str, float], leaving: LeavingOut,
 ) -> list[VehiclePlan]:  # fmt: skip
-    """The vehicles, those that can wait with gates on their ways, and at no more than their ``most_m_s``.
+    """The vehicles, with gates on the ways of all that can wait, which fly at no more than their ``most_m_s``.
 
     Raises InputError if no vehicle passes a gate. Raises NoMission if a way is too short for its gates, or if its
     mission then breaks a limit, unless such a vehicle may be left out.

@@ -303,8 +303,10 @@ class FlightInWind:
 
     @cached_property
     def _held_s(self) -> tuple[Floats, Floats]:
-        """(N,) the shortest and the longest hold at the end of each stretch: whole circles take longer in a wind. Without
-        waits until a time of day, after which times begin anew."""
+        """(N,) the shortest and the longest hold at the end of each stretch: whole circles take longer in a wind.
+
+        Without waits until a time of day, after which times begin anew.
+        """
         hold = np.array([0.0 if math.isinf(s.hold_s) else s.hold_s for s in self.stretches])
         hold[self._waits] = 0.0
         least, most = hold.copy(), hold.copy()

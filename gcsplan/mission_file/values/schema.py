@@ -391,7 +391,7 @@ class ArrivalKeys(Keys):
     separation_m: Length | None = None
     """Least distance between any two vehicles, from take-off to landing."""
     gates: Annotated[_Gates | None, BeforeValidator(_gates_form)] = None
-    """How many times each ArduCopter waits on its way until a second of the day: `auto`, a number, or a list of places."""
+    """How often each ArduCopter waits on its way until a second of the day: `auto`, a number, or a list of places."""
     leave_out: bool = False
     """Whether a vehicle without a mission is left out, by name, and the others planned; otherwise it refuses all."""
 

@@ -78,7 +78,8 @@ def on_board_of(plan: Plan, v: VehiclePlan, mission: Mission, units: Units) -> d
         return {"line": [], "verdict": "", "headline": "there is no mission on board", "rows": [], "remarks": []}
     wording = Wording(units)
     verdict = judge(
-        replace(sent_for(mission), leaves_s=v.mission.leaves_s), v.request.vehicle, plan.world, rtl_rel_home_m=v.request.rtl_rel_home_m,
+        replace(sent_for(mission), leaves_s=v.mission.leaves_s), v.request.vehicle, plan.world,
+        rtl_rel_home_m=v.request.rtl_rel_home_m,
         terrain_error_m=plan.source.terrain_error_m, wind=plan.source.flight_wind(v.request),
     )  # fmt: skip
     [difference] = differences(plan, {v.name: EarlierMission(ON_BOARD, mission)}).values()

@@ -150,7 +150,8 @@ def test_no_wind_that_is_drawn_breaks_a_fleet_with_gates(seed: int) -> None:
     wind = {"speed_m_s": [low, high], "from_deg": [from_deg, (from_deg + turn_deg) % 360.0], "varying": varying}
     window_s = rng.choice([5.0, 20.0, 40.0])
     arrival = {
-        "mode": "sequence", "interval_s": rng.choice([60, 120]), "window_s": window_s, "gates": rng.choice([1, 2, "auto"]),
+        "mode": "sequence", "interval_s": rng.choice([60, 120]), "window_s": window_s,
+        "gates": rng.choice([1, 2, "auto"]),
     }  # fmt: skip
     kinds = "c" + "".join(rng.choice("ccw") for _ in range(rng.randint(1, 3)))
     document = fan(kinds, wind, arrival)
