@@ -157,12 +157,12 @@ PLAN_TEXTS = {
         "one that comes after its gate's second waits there for nearly a day"
     ),
     "no_gates_on_way": (
-        "has no gates: {autopilot} {px4:reads only the seconds of a wait|does not wait in the air}, so it goes on at "
-        "once at a gate with a time of day"
+        "has no gates: {autopilot} {px4:reads only the seconds of a wait|does not wait in the air}, so it goes on "
+        "at once at a gate with a time of day"
     ),
     "waits_at_gates": (
-        "waits {wait_s:seconds.0} in all at {count} {count:gate|gates} on its way{energy}; its arrivals in the declared "
-        "winds lie within {width_s:seconds.1} instead of {without_s:seconds.1}"
+        "waits {wait_s:seconds.0} in all at {count} {count:gate|gates} on its way{energy}; its arrivals in the "
+        "declared winds lie within {width_s:seconds.1} instead of {without_s:seconds.1}"
     ),
     "gates_take": (", for {energy_j:joules} at most"),
     "clock_of_fleet": (

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from datetime import UTC, datetime
 from itertools import pairwise
 from typing import TYPE_CHECKING, Literal
 
@@ -26,7 +25,15 @@ from gcsplan.app.fleet.every_wind import (
     steadier,
     with_cures,
 )
-from gcsplan.app.fleet.gates import WHERE, counts, gated, gates_bought, no_time_of_day, waits_for_time
+from gcsplan.app.fleet.gates import (
+    WHERE,
+    counts,
+    gated,
+    gates_bought,
+    no_time_of_day,
+    some_start,
+    waits_for_time,
+)
 from gcsplan.app.fleet.reroute import Detours
 from gcsplan.app.fleet.start_time import SLACK_S, GateTime, with_start_gates
 from gcsplan.app.plan.flight_hours import within_hours
@@ -89,8 +96,6 @@ def _line(legs: Sequence[LegFigures], world: World) -> Floats:
     return np.column_stack([world.frame.to_plane(places[:, 0], places[:, 1]), places[:, 2]])
 
 
-ANY_START = datetime(2000, 1, 1, tzinfo=UTC)
-"""A common start at which it is tried how many gates would do, where none is given."""
 LATER_S = 600.0
 """Seconds by which all arrivals may be delayed to keep a fleet apart, if the mission file sets no arrival time."""
 SEPARATION_M = 30.0
@@ -171,7 +176,7 @@ def fleet_of(
         speeds = steadier(tried, terms.source.arrival.hold)
         for gates in counts(None if request == "auto" and gate is None else request):
             for pace in ({}, speeds) if speeds else ({},):
-                start = gate if gates is None else gate or GateTime(brief.source.departure or ANY_START)
+                start = gate if gates is None else gate or GateTime(some_start(brief.source))
                 try:
                     return _fleet_of(tried, _having(terms, gates), start, LeavingOut(allowed=False), pace)
                 except NoMission as why:

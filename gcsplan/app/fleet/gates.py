@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from datetime import datetime
+from datetime import UTC, datetime
 from typing import Literal
 
 import numpy as np
@@ -24,11 +24,11 @@ from gcsplan.arrays import Floats
 from gcsplan.errors import InputError, NoMission
 from gcsplan.fleet.arrival import Slot
 from gcsplan.mavlink.build.order import Gates
-from gcsplan.mission_file.request import GatePlaces
+from gcsplan.mission_file.request import GatePlaces, MissionFile
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Vehicle
 
-__all__ = ["MOST_SOUGHT", "WHERE", "counts", "gated", "gates_bought", "no_time_of_day", "waits_for_time"]
+__all__ = ["MOST_SOUGHT", "WHERE", "counts", "gated", "gates_bought", "no_time_of_day", "some_start", "waits_for_time"]
 
 WHERE = "arrival.gates"
 MOST_SOUGHT = 8
@@ -40,7 +40,14 @@ APART_M = 200.0
 GUESS_S = 600
 """Seconds between gates before it is known how long the flight to them takes."""
 
+ANY_START = datetime(2000, 1, 1, tzinfo=UTC)
+
 GateRequest = int | GatePlaces | Literal["auto"] | None
+
+
+def some_start(source: MissionFile) -> datetime:
+    """A common start for what is not flown: a rehearsal in simulated time, and how many gates would do."""
+    return source.departure or ANY_START
 
 
 def counts(request: GateRequest) -> Iterator[int | GatePlaces | None]:
@@ -93,7 +100,7 @@ def gated(
 
 
 def _with(v: VehiclePlan, brief: Brief, at_m: tuple[float, ...], start: datetime, most_m_s: float) -> VehiclePlan:
-    start_s = start.timestamp()
+    start_s = (start if start.tzinfo else start.replace(tzinfo=UTC)).timestamp()
     opens_s = tuple(round(start_s) + GUESS_S * (k + 1) for k in range(len(at_m)))
     v = replace(v, order=replace(v.order, gates=Gates(at_m, opens_s, start_s, start_s)))
     return rebuilt(v, brief, speed_m_s=min(v.speed_m_s, most_m_s))

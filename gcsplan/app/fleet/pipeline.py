@@ -55,8 +55,8 @@ def plan(  # noqa: PLR0913 - options by name, each with a default
     (``length`` in metres or ``energy`` in joules), ``seed`` and ``options`` (keys of single planners, such as a swarm's
     ``encoding``) override the file's. ``planner`` may also be a function that gets a `Problem` and returns a
     `Solution`: its path is judged like any other, and its vehicles are planned in this process. ``gate_utc`` is the
-    common start as a time of day; every ArduCopter then waits in the air until its own second. ``progress(vehicle,
-    progress)`` is called from time to time.
+    common start as a time of day; every ArduCopter then waits in the air until its own second, or at the gates on its
+    way, if the mission's ``arrival`` has some. ``progress(vehicle, progress)`` is called from time to time.
 
     ``jobs`` processes of this machine plan the vehicles (None: one for each core), or the workers of ``cluster``, the
     address of a dask scheduler or a ``distributed.Client``; the plan is the same to the byte. A few vehicles are

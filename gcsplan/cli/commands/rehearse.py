@@ -111,6 +111,7 @@ def rehearse(
     """
     from gcsplan.app import rehearse as rehearsing
     from gcsplan.app.fleet import pipeline
+    from gcsplan.app.fleet.gates import some_start
     from gcsplan.app.fleet.may_fly import flyable
     from gcsplan.app.output.report import render_rehearsal
     from gcsplan.app.plan.left_out import refusal_of
@@ -137,7 +138,11 @@ def rehearse(
     names = [r.vehicle.name for r in source.vehicles]
     addresses, late_s = rehearsing.seats_of(sitl or [], names), rehearsing.late_of(late or [], names)
     with planning_display(names, source.planner.objective) as progress:
-        planned = pipeline.plan(source, planner=planner, progress=progress, jobs=jobs, cluster=cluster)
+        has_gates = source.arrival is not None and source.arrival.gates is not None
+        planned = pipeline.plan(
+            source, planner=planner, progress=progress, jobs=jobs, cluster=cluster,
+            gate_utc=some_start(source) if has_gates else None,
+        )  # fmt: skip
     planned, homes = flyable(
         planned, allow_unjudged=allow_unjudged, home=way_home or report is not None, require_way_home=require_way_home
     )
