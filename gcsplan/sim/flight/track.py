@@ -46,9 +46,9 @@ class CommandedTrack:
     common start, where that is a time of day; else NaN. Of the pieces (N - 1,): ``cap_m_s``, the highest speed that
     climb, descent and corners allow; ``command_m_s``, the commanded speed over ground; ``level``, the horizontal
     fraction of its length; ``accel_m_s2``; ``airspeed_m_s`` (N - 1, 2), the highest level and on its slope; ``column``
-    (take-off or landing); ``seq``, the wire item. ``ground`` (M, 2): metres along the track, and the ground below, m AMSL. ``goal``:
-    the node at which the planned path ends. ``keeps_airspeed``: the commanded speed is through the air, and wind adds
-    to it.
+    (take-off or landing); ``seq``, the wire item. ``ground`` (M, 2): metres along the track, and the ground below, m
+    AMSL. ``goal``: the node at which the planned path ends. ``keeps_airspeed``: the commanded speed is through the air,
+    and wind adds to it.
     """
 
     name: str
