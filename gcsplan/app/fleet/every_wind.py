@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gcsplan.app.fleet.gates import MOST_SOUGHT, waits_for_time
+from gcsplan.app.fleet.gates import waits_for_time
 from gcsplan.app.plan.model import Brief, VehiclePlan
 from gcsplan.app.plan.problem import built
 from gcsplan.app.plan.vehicle import rebuilt
@@ -28,7 +28,6 @@ MOST_TRIED = 6
 """Most vehicles with which a refusal tries what would do."""
 CURE_TRIES = 3
 """Winds, and intervals twice, that a refusal tries: up to the first that works, and then between."""
-LEAST_WINDOW_S = 1.0
 INTERVAL_FACTOR = 2
 """Factor from one interval that is tried to the next."""
 
@@ -130,7 +129,7 @@ def with_cures(why: NoMission, vehicles: Sequence[VehiclePlan], brief: Brief, ag
         return why
     found = [
         *_windows(why, vehicles, brief, again),
-        *_gates(why, vehicles, brief, again),
+        *_gates(vehicles, brief, again),
         *_speeds(vehicles, brief, again),
         *_winds(vehicles, brief, again),
     ]
@@ -180,27 +179,15 @@ def _windows(why: NoMission, vehicles: Sequence[VehiclePlan], brief: Brief, agai
     return [f"{words} with interval_s: {good}" if words else f"interval_s: {good}"]
 
 
-def _gates(why: NoMission, vehicles: Sequence[VehiclePlan], brief: Brief, again: Retimed) -> list[str]:
+def _gates(vehicles: Sequence[VehiclePlan], brief: Brief, again: Retimed) -> list[str]:
     """The least number of gates on the copters' ways, where these need a common start that is not given."""
     arrival = brief.source.arrival
     assert arrival is not None
     if arrival.gates not in (None, "auto") or not any(waits_for_time(v.request.vehicle) for v in vehicles):
         return []
-
-    def works(count: int) -> bool:
-        return _works(again, vehicles, _with(brief, arrival=replace(arrival, gates=count)))
-
-    # Equal parts of a way have about equal parts of its window.
-    wide_s = why.window_s if isinstance(why, NotInEveryWind) else 0.0
-    first = min(math.ceil(wide_s / max(arrival.window_s, LEAST_WINDOW_S)) - 1, MOST_SOUGHT)
-    count = max(first, 1)
-    for tries in range(CURE_TRIES):
-        if not works(count):
-            count += 1
-            continue
-        while tries < CURE_TRIES and count > 1 and works(count - 1):
-            tries, count = tries + 1, count - 1
-        return [f"gates: {count} with a common start (--gate-utc)"]
+    for count in range(1, CURE_TRIES + 1):
+        if _works(again, vehicles, _with(brief, arrival=replace(arrival, gates=count))):
+            return [f"gates: {count} with a common start (--gate-utc)"]
     return []
 
 

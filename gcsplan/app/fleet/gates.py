@@ -28,7 +28,7 @@ from gcsplan.mission_file.request import GatePlaces, MissionFile
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Vehicle
 
-__all__ = ["MOST_SOUGHT", "WHERE", "counts", "gated", "gates_bought", "no_time_of_day", "some_start", "waits_for_time"]
+__all__ = ["WHERE", "counts", "gated", "gates_bought", "no_time_of_day", "some_start", "waits_for_time"]
 
 WHERE = "arrival.gates"
 MOST_SOUGHT = 8
@@ -107,18 +107,19 @@ def _with(v: VehiclePlan, brief: Brief, at_m: tuple[float, ...], start: datetime
 
 
 def _places_m(v: VehiclePlan, gates: int | GatePlaces) -> tuple[float, ...]:
-    """Metres over ground from the begin of the path to each gate."""
+    """Metres over ground from the begin of the path to each gate: a number of them at equal distances, the last just
+    before the goal, for only what is flown behind it makes the arrival uncertain."""
     points = v.solution.path.points[:, :2]
     along_m = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
     way_m = float(along_m[-1])
     if isinstance(gates, int):
-        if way_m < APART_M * (gates + 1):
-            most = max(math.floor(way_m / APART_M) - 1, 0)
+        most = max(math.floor(way_m / APART_M) - 1, 0)
+        if gates > most:
             raise NoMission(
                 f"{v.name}: its way of {way_m:.0f} m has room for {most} gates {APART_M:g} m apart, not for {gates}",
                 reason="time",
             )
-        return tuple(way_m * (k + 1) / (gates + 1) for k in range(gates))
+        return tuple((way_m - APART_M) * (k + 1) / gates for k in range(gates))
     found = sorted(at for place in gates if (at := _passed_m(points, along_m, place)) is not None)
     kept: list[float] = []
     for at in found:

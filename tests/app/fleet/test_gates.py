@@ -106,7 +106,7 @@ def test_behind_a_gate_the_window_begins_anew() -> None:
         verdict = planned(gates, UP_TO).vehicles[0].verdict
         earliest_s, latest_s = verdict.arrive_window_s() or (0.0, 0.0)
         widths.append(latest_s - earliest_s)
-    assert widths[1] == pytest.approx(0.25 * widths[0], rel=0.02)
+    assert widths[1] == pytest.approx(0.1 * widths[0], rel=0.02)  # the last 200 m of 2 km
 
 
 @pytest.mark.slow
@@ -124,11 +124,10 @@ def test_the_energy_of_a_wait_is_of_the_earliest_arrival() -> None:
 def test_the_least_number_of_gates_keeps_a_sequence_in_each_wind() -> None:
     done = planned("auto", UP_TO, 2)
     counts = [len(row["gates"]) for row in summary_of(done)["vehicles"]]
-    assert counts[0] == counts[1] >= 1
+    assert counts == [1, 1]
     assert_held(done, Winds([[(0.0, 4.0)]], [[(0.0, 360.0)]]), some_shares(3, 5), 31.0, 60.0)
-    if counts[0] > 1:
-        with pytest.raises(NoMission, match="in the declared winds"):
-            planned(counts[0] - 1, UP_TO, 2)
+    with pytest.raises(NoMission, match="gates: 1 with a common start"):
+        plan(lane(None, UP_TO, 2))
 
 
 @pytest.mark.nightly
