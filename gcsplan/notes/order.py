@@ -13,6 +13,7 @@ FLIGHT = (
     "climb_out", "climb_out_in_circles", "circles_instead", "climb_out_straight", "climb_out_circles",
     "climb_out_drifts", "climb_out_blown", "turns_early", "approach", "approach_into_wind", "approach_uphill",
     "glide_straight", "lands_downhill", "lands_fast", "waits_on_ground", "holds_at_gate", "holds_and_waits",
+    "waits_at_gates",
     "leaves_later", "leaves_earlier", "flies_at", "keeps_clear", "lean_bounds_speed", "lean_bounds_speed_curably",
     "velocity_bounds_speed", "lean_to_set", "lean_counted_with", "takeoff_raised", "approach_raised", "via_moved",
     "returns_by_itself", "return_leads_to_landing", "battery_until_reserve", "ends_in_the_air",

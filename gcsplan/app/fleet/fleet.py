@@ -166,8 +166,10 @@ def fleet_of(
     arrival = brief.source.arrival
     if arrival is not None and gate is None and arrival.gates not in (None, "auto"):
         raise InputError("gates open at times of the day: give the common start (--gate-utc)", where=WHERE)
+    at_start = gate if arrival is None or arrival.gates is None else None  # else they wait on the way, or nowhere
     if arrival is None or len(vehicles) < 2 or not any(drifts(v) for v in vehicles):
-        return _fleet_of(vehicles, _having(brief, next(counts(arrival and arrival.gates))), gate, leaving, {})
+        gates = None if arrival is None else next(counts(arrival.gates))
+        return _fleet_of(vehicles, _having(brief, gates), at_start if gates is None else gate, leaving, {})
 
     def again(tried: Sequence[VehiclePlan], terms: Brief) -> tuple[tuple[VehiclePlan, ...], FleetPlan]:
         """With as few gates as are requested; as in still air, or else at speeds at which the vehicles drift less."""
@@ -176,7 +178,7 @@ def fleet_of(
         speeds = steadier(tried, terms.source.arrival.hold)
         for gates in counts(None if request == "auto" and gate is None else request):
             for pace in ({}, speeds) if speeds else ({},):
-                start = gate if gates is None else gate or GateTime(some_start(brief.source))
+                start = at_start if gates is None else gate or GateTime(some_start(brief.source))
                 try:
                     return _fleet_of(tried, _having(terms, gates), start, LeavingOut(allowed=False), pace)
                 except NoMission as why:
@@ -188,7 +190,8 @@ def fleet_of(
     except NoMission as why:
         if not leaving.allowed:
             raise with_cures(why, vehicles, brief, again) from why
-    brief = _having(brief, None if arrival.gates == "auto" else arrival.gates)
+    gates = None if arrival.gates == "auto" else arrival.gates
+    brief, gate = _having(brief, gates), at_start if gates is None else gate
     speeds = steadier(vehicles, arrival.hold)
     while True:
         tried = LeavingOut(allowed=True, found=leaving.found)
