@@ -148,7 +148,8 @@ def _set_waits(flight: Flight, seconds: Floats) -> None:
 
 def _missed_gates(flight: Flight, seconds: Floats, blown: FlightInWind | None) -> list[Finding]:
     """The findings on gates that the vehicle may reach after their second: it would wait there until the next day."""
-    found, opened_s, reached_s = [], 0.0, 0.0
+    found: list[Finding] = []
+    opened_s = reached_s = 0.0
     for k, s in enumerate(flight.stretches):
         if s.until_s is None:
             reached_s += float(seconds[k]) + s.hold_s

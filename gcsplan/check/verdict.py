@@ -226,7 +226,8 @@ class Verdict:
         """When each gate may open at the earliest, so that the vehicle is there in every declared wind, seconds from
         leaving the ground: each as if the one before it opened as early as that. They open at the nearest whole
         second, so each has one to spare."""
-        found, still_s, before = [], 0.0, 0.0
+        found: list[float] = []
+        still_s = before = 0.0
         window = None if self.in_wind is None else self.in_wind.window
         for k, leg in enumerate(self.legs):
             if leg.until_s is None:

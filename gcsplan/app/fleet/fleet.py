@@ -176,8 +176,9 @@ def fleet_of(
         assert terms.source.arrival is not None
         request, refusal = terms.source.arrival.gates, NoMission("", reason="time")
         speeds = steadier(tried, terms.source.arrival.hold)
+        paces: list[Mapping[str, SpeedRange]] = [{}, speeds] if speeds else [{}]
         for gates in counts(None if request == "auto" and gate is None else request):
-            for pace in ({}, speeds) if speeds else ({},):
+            for pace in paces:
                 start = at_start if gates is None else gate or GateTime(some_start(brief.source))
                 try:
                     return _fleet_of(tried, _having(terms, gates), start, LeavingOut(allowed=False), pace)
@@ -190,7 +191,7 @@ def fleet_of(
     except NoMission as why:
         if not leaving.allowed:
             raise with_cures(why, vehicles, brief, again) from why
-    gates = None if arrival.gates == "auto" else arrival.gates
+    gates = None if isinstance(arrival.gates, str) else arrival.gates
     brief, gate = _having(brief, gates), at_start if gates is None else gate
     speeds = steadier(vehicles, arrival.hold)
     while True:
@@ -225,7 +226,7 @@ def _fleet_of(
     common, gate_times = gate, None if gates else gate
 
     def on_way(some: Sequence[VehiclePlan], leaving: LeavingOut) -> list[VehiclePlan]:
-        if not gates or common is None or gates == "auto":
+        if not gates or common is None or isinstance(gates, str):
             return list(some)
         most_m_s = {name: pace.most_m_s for name, pace in speeds.items()}
         return gated(some, brief, gates, common.start, most_m_s, leaving)

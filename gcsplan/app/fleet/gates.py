@@ -52,7 +52,7 @@ def some_start(source: MissionFile) -> datetime:
 
 def counts(request: GateRequest) -> Iterator[int | GatePlaces | None]:
     """The gates to try for a request, in turn."""
-    if request == "auto":
+    if isinstance(request, str):
         yield from (None, *range(1, MOST_SOUGHT + 1))
     else:
         yield request
@@ -77,7 +77,8 @@ def gated(
     Raises InputError if no vehicle passes a gate. Raises NoMission if a way is too short for its gates, or if its
     mission then breaks a limit, unless such a vehicle may be left out.
     """
-    found, passes = [], False
+    found: list[VehiclePlan] = []
+    passes = False
     for v in vehicles:
         try:
             at_m = _places_m(v, gates) if waits_for_time(v.request.vehicle) else ()

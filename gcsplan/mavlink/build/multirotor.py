@@ -76,7 +76,8 @@ def build_mission(path: Path, world: World, vehicle: Vehicle, home_deg: tuple[fl
                 "a larger DEM, or another altitude_frame"
             )
         points = np.column_stack([points[:, :2], points[:, 2] - ground])
-    points, opens = split_legs(points, world, order.bow_m), {}
+    points = split_legs(points, world, order.bow_m)
+    opens: dict[int, int] = {}
     gates = order.gates
     if gates is not None:
         points, rows = with_gates(points, gates.at_m)
