@@ -29,7 +29,9 @@ def test_missions_are_of_every_kind_and_the_same_for_a_seed(tmp_path: Path) -> N
 
 def test_fleets_are_in_sequence_in_every_kind_of_wind(tmp_path: Path) -> None:
     made = [wind.fleet_of(1, number, tmp_path) for number in range(1, 40)]
-    assert {kind for kind, _ in made} == set(wind.WIND_KINDS)
+    assert {kind.removesuffix(", gates") for kind, _ in made} == set(wind.WIND_KINDS)
+    assert all(("gates" in document["arrival"]) == kind.endswith(", gates") for kind, document in made)
+    assert {str(document["arrival"].get("gates")) for _, document in made} == {"None", "1", "2", "3", "auto"}
     assert {len(document["vehicles"]) for _, document in made} == set(range(2, 9))
     assert made[6] == wind.fleet_of(1, 7, tmp_path)
 
