@@ -89,14 +89,14 @@ def gated(
             leaving.leave(v.name, why)
     if not passes:
         able = [v for v in vehicles if waits_for_time(v.request.vehicle)]
-        why = (
+        words = (
             f"no vehicle passes within {REACH_M:g} m of a place, {APART_M:g} m from the ends of its way: give other "
             "places, or how many gates each has"
             if able
             else f"{vehicles[0].name} {no_time_of_day(vehicles[0].request.vehicle)}: leave gates out, and give a wider "
             "window_s"
         )
-        raise InputError(why, where=WHERE)
+        raise InputError(words, where=WHERE)
     return found
 
 

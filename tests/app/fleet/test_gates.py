@@ -148,7 +148,7 @@ def test_no_wind_that_is_drawn_breaks_a_fleet_with_gates(seed: int) -> None:
     high, turn_deg = low + rng.choice([0.5, 2.0]), rng.choice([10.0, 60.0, 180.0])
     wind = {"speed_m_s": [low, high], "from_deg": [from_deg, (from_deg + turn_deg) % 360.0], "varying": varying}
     window_s = rng.choice([5.0, 20.0, 40.0])
-    arrival = {
+    arrival: dict[str, Any] = {
         "mode": "sequence", "interval_s": rng.choice([60, 120]), "window_s": window_s,
         "gates": rng.choice([1, 2, "auto"]),
     }  # fmt: skip
