@@ -1,13 +1,15 @@
 """OMPL's asymptotically optimal planners on a problem, with the same exact check, one leg at a time.
 
-They search the box of the surface between the lowest legal altitude and the ceiling, for length in space, with OMPL's
-own defaults. States and motions are judged by `one_leg`: exact, with climb limit and zones, without sampling. For a
-single leg, `Airspace.clear` spends a hundred times the kernel's own time on entering compiled code. So everything but
-the leg's ends is kept in an object that is compiled around the same kernel, which leaves about 1.5 microseconds.
+They search the box of the surface between the lowest legal altitude and the ceiling, for length in space or for the
+least time, with OMPL's own defaults. States and motions are judged by `one_leg`: exact, with climb limit and zones,
+without sampling. For a single leg, `Airspace.clear` spends a hundred times the kernel's own time on entering compiled
+code. So everything but the leg's ends is kept in an object that is compiled around the same kernel, which leaves about
+1.5 microseconds.
 
 Their seconds are processor seconds, so that other work on the machine does not count. The crossing from C++ to Python
 and back takes about as long as RRT*'s own work and is not counted either: its least time is measured before each run,
 and subtracted for every check. So they get about the time that they would have with the check in their own language.
+Of the least time, which OMPL does not know, the whole cost of a motion is subtracted.
 The time to the first path is the processor's, with nothing subtracted.
 """
 
@@ -24,7 +26,6 @@ from typing import Any
 
 import numpy as np
 
-from gcsplan.bench.measure import length_m
 from gcsplan.errors import InputError
 from gcsplan.planners.problem import Problem
 from gcsplan.world.airspace import Airspace, Legs
@@ -88,7 +89,7 @@ def warm_up(problem: Problem) -> None:
 def plan(problem: Problem, name: str, seconds: float, seed: int) -> RivalAnswer:
     """Run the planner of `PLANNERS` called ``name`` for ``seconds``, then simplify its path, which takes milliseconds.
 
-    The shorter of the path as found and as simplified is kept. ``seed`` has an effect only in the first run of a
+    The cheaper of the path as found and as simplified is kept. ``seed`` has an effect only in the first run of a
     process; planners that stop by the clock are not repeatable anyway. Raises InputError if OMPL is missing.
     """
     base, geometric, util = (rival_module(f"ompl.{part}") for part in ("base", "geometric", "util"))
@@ -111,17 +112,19 @@ def plan(problem: Problem, name: str, seconds: float, seed: int) -> RivalAnswer:
         start[axis], goal[axis] = problem.start[axis], problem.goal[axis]
     definition = base.ProblemDefinition(info)
     definition.setStartAndGoalStates(start, goal)
-    definition.setOptimizationObjective(base.PathLengthOptimizationObjective(info))
+    costs = [0]
+    objective = _objective(base, info, problem, costs)
+    definition.setOptimizationObjective(objective)
     planner = getattr(geometric, PLANNERS[name])(info)
     planner.setProblemDefinition(definition)
     planner.setup()
-    crossing_s = _crossing_s(info, start, problem)
+    crossing_s, costing_s = _crossing_s(info, start, problem), _costing_s(geometric, info, objective, (start, goal))
     first: list[float] = []
-    counts[0] = 0
+    counts[0] = costs[0] = 0
     began = time.process_time()
 
     def elapsed_s() -> float:
-        return time.process_time() - began - counts[0] * crossing_s
+        return time.process_time() - began - counts[0] * crossing_s - costs[0] * costing_s
 
     def over() -> bool:
         if not first and math.isfinite(planner.bestCost().value()):
@@ -136,9 +139,9 @@ def plan(problem: Problem, name: str, seconds: float, seed: int) -> RivalAnswer:
     raw = _points(path)
     geometric.PathSimplifier(info).simplify(path, 10.0 * seconds)  # ends by itself long before that time
     simple = _points(path) if path.check() else raw
-    best = min(raw, simple, key=length_m)
-    took = elapsed_s()
-    return RivalAnswer(best, length_m(best), length_m(raw), first[0] if first else planned_s, took, counts[0])
+    cost, best = min((problem.cost_through(np.array(way)), way) for way in (raw, simple))
+    took, raw_cost = elapsed_s(), problem.cost_through(np.array(raw))
+    return RivalAnswer(best, cost, raw_cost, first[0] if first else planned_s, took, counts[0])
 
 
 def box_of(problem: Problem) -> list[tuple[float, float]]:
@@ -172,6 +175,44 @@ def _judges(base: Any, info: Any, problem: Problem, counts: list[int]) -> tuple[
             return clear(a[0], a[1], a[2], b[0], b[1], b[2])
 
     return StateCheck(info), MotionCheck(info)
+
+
+def _objective(base: Any, info: Any, problem: Problem, costs: list[int]) -> Any:
+    """What OMPL minimises: the length in space; or the time at full speed, with a count of its motions."""
+    if problem.objective == "length":
+        return base.PathLengthOptimizationObjective(info)
+    speed_m_s, climb_m_s, descent_m_s = problem.speed_m_s, problem.climb_m_s, problem.descent_m_s
+
+    def seconds(a: Any, b: Any) -> Any:
+        costs[0] += 1
+        rise_m = b[2] - a[2]
+        run_s = math.hypot(b[0] - a[0], b[1] - a[1]) / speed_m_s
+        return base.Cost(max(run_s, rise_m / climb_m_s if rise_m > 0.0 else -rise_m / descent_m_s))
+
+    class LeastTime(base.OptimizationObjective):  # type: ignore[misc]
+        def stateCost(self, _: Any) -> Any:
+            return base.Cost(0.0)
+
+        def motionCost(self, a: Any, b: Any) -> Any:
+            return seconds(a, b)
+
+        def motionCostHeuristic(self, a: Any, b: Any) -> Any:
+            return seconds(a, b)  # no way between two places is faster than the straight one
+
+    return LeastTime(info)
+
+
+def _costing_s(geometric: Any, info: Any, objective: Any, ends: tuple[Any, Any]) -> float:
+    """Seconds of the cost of one motion: the least of several timings of a path of `CROSSINGS` motions."""
+    path = geometric.PathGeometric(info)
+    for k in range(CROSSINGS + 1):
+        path.append(ends[k % 2])
+    taken = []
+    for _ in range(9):
+        began = time.process_time()
+        path.cost(objective)
+        taken.append(time.process_time() - began)
+    return min(taken) / CROSSINGS
 
 
 def _crossing_s(info: Any, state: Any, problem: Problem) -> float:

@@ -5,6 +5,7 @@ Kinds:
 - ``main``: 20 pairs 5 to 25 km apart, each with 0, 10 and 40 zones (the ten are the first of the forty); at least 60 m
   above ground, a max AMSL that blocks the straight line, climb and descent of 10 to 15 degrees;
 - ``energy``: all of ``main``, in joules;
+- ``time``: all of ``main``, in seconds, at 15 m/s, with climbs of 2.5 and descents of 1.5 m/s;
 - ``band``: 20 pairs, 60 to 120 m above ground, climb and descent of 10 degrees and again of 15, no max AMSL, no zones:
   it is not known beforehand whether a path exists;
 - ``large``: five pairs of ``main`` with ten zones over the whole sample, refined ten times by cubic splines (3431 ×
@@ -108,7 +109,7 @@ def problems(
         seen[one.group] = seen.get(one.group, 0) + 1
         if count is None or seen[one.group] <= count:
             if kind != "ceiling":
-                goal: Objective = "energy" if kind == "energy" else objective
+                goal: Objective = kind if kind in ("energy", "time") else objective  # type: ignore[assignment]
                 one = replace(one, problem=replace(one.problem, objective=goal))
             found.append(replace(one, seed=seed, errors=errors or kind == "ceiling"))
     return found
@@ -135,6 +136,7 @@ def key_of(problem: Problem) -> str:
     inputs = (
         [f"{x:.3f}" for x in (*p.start, *p.goal, *corners.ravel().tolist())], p.via, zones, p.limits,
         p.objective, p.vertical_j_per_m, p.horizontal_j_per_m, p.turn_radius_m, round(p.airspace.scale, 9),
+        *((p.speed_m_s, p.climb_m_s, p.descent_m_s) if p.objective == "time" else ()),
     )  # fmt: skip
     digest = hashlib.sha256(repr(inputs).encode())
     digest.update(surface.ground_m.tobytes())
@@ -164,9 +166,15 @@ def _main(seed: int, limits: Limits, count: int | None) -> Iterator[NamedProblem
             )
 
 
-def _energy(seed: int, limits: Limits, count: int | None) -> Iterator[NamedProblem]:
-    for one in _main(seed, limits, count):
-        yield replace(one, name=one.name.replace("main", "energy"), kind="energy", group=f"{one.group}, energy")
+def _main_for(objective: Objective) -> Callable[[int, Limits, int | None], Iterator[NamedProblem]]:
+    """All of ``main`` with another objective, which `problems` sets."""
+
+    def make(seed: int, limits: Limits, count: int | None) -> Iterator[NamedProblem]:
+        for one in _main(seed, limits, count):
+            name, group = one.name.replace("main", objective), f"{one.group}, {objective}"
+            yield replace(one, name=name, kind=objective, group=group)
+
+    return make
 
 
 def _band(seed: int, limits: Limits, count: int | None) -> Iterator[NamedProblem]:
@@ -258,11 +266,11 @@ def _ceiling(seed: int, limits: Limits, count: int | None) -> Iterator[NamedProb
 
 
 _PROBLEM_MAKERS: dict[str, Callable[[int, Limits, int | None], Iterator[NamedProblem]]] = {
-    "main": _main, "energy": _energy, "band": _band, "large": _large, "many": _many, "turn": _turn,
-    "everyday": _everyday, "ceiling": _ceiling, "room": _room,
+    "main": _main, "energy": _main_for("energy"), "band": _band, "large": _large, "many": _many, "turn": _turn,
+    "everyday": _everyday, "ceiling": _ceiling, "room": _room, "time": _main_for("time"),
 }  # fmt: skip
 PROBLEM_KINDS = tuple(_PROBLEM_MAKERS)
-MOUNTAINS = PROBLEM_KINDS[:-3]
+MOUNTAINS = PROBLEM_KINDS[:-4]
 """The kinds over real mountains that are measured unless others are named."""
 
 

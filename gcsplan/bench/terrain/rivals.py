@@ -23,8 +23,8 @@ from gcsplan.bench.terrain.problems import NamedProblem, key_of, problems
 from gcsplan.errors import InputError
 from gcsplan.planners.problem import Problem
 
-RIVAL_KINDS = ("main", "band", "everyday")
-"""The kinds that all rivals can solve: length without a turn radius."""
+RIVAL_KINDS = ("main", "band", "everyday", "time")
+"""The kinds that rivals can solve: length, or time, without a turn radius."""
 
 RIVAL_START_S = 180.0  # seconds to import, make the problems and compile
 

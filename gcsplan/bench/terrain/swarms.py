@@ -17,7 +17,7 @@ from collections.abc import Callable
 import numpy as np
 
 from gcsplan.arrays import Floats
-from gcsplan.bench.measure import length_m, passes
+from gcsplan.bench.measure import passes
 from gcsplan.bench.terrain.ompl import RivalAnswer, box_of, rival_module
 from gcsplan.planners.problem import Problem
 from gcsplan.world.geometry.zones import Circle, Level
@@ -29,8 +29,8 @@ SWARM_MEMBERS, EPOCHS = 30, 500
 CONTROL, SPLINE_SAMPLES = 8, 200
 SAMPLE_SPARE_M, SAMPLE_SPARE_SLOPE = 5.0, 0.95
 VIOLATION_WEIGHT = 30.0
-"""Metres of length that each metre of violation of each sample counts. Any violation at all costs a hundred times that
-in addition, so that no illegal path beats a legal one of similar length."""
+"""What each metre of violation of each sample costs, in metres or seconds. Any violation at all costs a hundred times
+that in addition, so that no illegal path beats a legal one of similar length."""
 
 
 def plan(problem: Problem, name: str, seed: int) -> RivalAnswer:
@@ -55,8 +55,8 @@ def plan(problem: Problem, name: str, seed: int) -> RivalAnswer:
     points = decode(np.asarray(best.solution, dtype=np.float64))
     if not passes(problem, points):
         return RivalAnswer(None, None, None, None, took, calls[0], "the best member does not pass the exact check")
-    way_m = length_m(points)
-    return RivalAnswer(points.tolist(), way_m, way_m, took, took, calls[0])
+    way_cost = problem.cost_through(points)
+    return RivalAnswer(points.tolist(), way_cost, way_cost, took, took, calls[0])
 
 
 def encoding(problem: Problem) -> tuple[Callable[[Floats], Floats], Callable[[Floats], float]]:
@@ -84,7 +84,9 @@ def encoding(problem: Problem) -> tuple[Callable[[Floats], Floats], Callable[[Fl
     def cost(x: Floats) -> float:
         points = decode(x)
         depth = _depths(problem, points)
-        return length_m(points) + VIOLATION_WEIGHT * depth + (100.0 * VIOLATION_WEIGHT if depth > 0.0 else 0.0)
+        return (
+            problem.cost_through(points) + VIOLATION_WEIGHT * depth + (100.0 * VIOLATION_WEIGHT if depth > 0.0 else 0.0)
+        )
 
     return decode, cost
 
