@@ -121,7 +121,7 @@ PLAN_TEXTS = {
         "intervals within {off_s:seconds.1 up}, and the separation"
     ),
     "speed_kept_in_wind": (
-        "{vehicle} flies at {speed_m_s:speed.2} at most, which it keeps over ground in every declared wind"
+        "it flies at {speed_m_s:speed.2} at most, which it keeps over ground in every declared wind"
     ),
     "schedule_in_still_air": (
         "the time table holds in still air alone: in the declared winds nothing keeps the vehicles apart or in their "

@@ -28,3 +28,9 @@ def test_every_code_that_has_a_rank_is_in_the_catalogue_once() -> None:
     codes = [*FLIGHT, *PLANNING]
     assert set(codes) <= set(TEXTS)
     assert len(codes) == len(set(codes))
+
+
+def test_a_note_on_a_vehicle_reads_well_behind_its_name() -> None:
+    [(name, note)] = for_people([("", Note("speed_kept_in_wind", vehicle="w1", speed_m_s=7.5))])
+    assert name == "w1"
+    assert str(note) == "it flies at 7.50 m/s at most, which it keeps over ground in every declared wind"
