@@ -137,6 +137,7 @@ class Taken:
         self._first_box: list[int] = []
         self._levels = Boxes(np.zeros((0, 4)), np.zeros((0, 4))).levels()
         self._reach_s = rules.window_s  # the largest of all
+        self._ended = Drifts.none(0)  # where each motion ends
 
     def add(self, path: TimedPath) -> None:
         """Give ``path`` priority over all that come later."""
@@ -149,6 +150,7 @@ class Taken:
         row = [*path.points[0, :2], *path.points[-1, :2], path.begin_s, path.end_s, float(self._lands(path))]
         self._pads = np.vstack([self._pads, row])
         self._reach_s = max(self._reach_s, reach_of(path, self.rules.window_s))
+        self._ended = self._ended.joined(path.end_drifts)
         self.paths.append(path)
 
     def forbidden(self, path: TimedPath, low_s: float = 0.0, high_s: float = 0.0, spare_m: float = 0.0) -> Spans:
@@ -217,20 +219,18 @@ class Taken:
         def near(place: Floats, others: Floats) -> Bools:
             return np.asarray(np.hypot(others[:, 0] - place[0], others[:, 1] - place[1]) < needed_m)
 
-        def drifts(mine: Drifts, theirs: Sequence[Drifts]) -> tuple[Floats, Floats]:
-            each = [between(mine, one) for one in theirs]
-            low, high = np.array(each).reshape(-1, 2).T
+        def drifts(mine: Drifts, theirs: Drifts) -> tuple[Floats, Floats]:
+            low, high = between(mine, theirs)
             return (np.minimum(low, -wide), np.maximum(high, wide)) if wide else (low, high)
 
         never = np.full(len(begins), math.inf)
         start, goal, begin, end = path.points[0], path.points[-1], path.begin_s, path.end_s
-        ended = [p.end_drifts for p in self.paths]
         on_time = Drifts.none(1)  # nothing drifts before it takes off
         # In turn: another lands where this one waits and takes off; this one lands where another waits; both land.
-        rows.append((lands & near(start, goals), ends - begin + drifts(on_time, ended)[0], never))
+        rows.append((lands & near(start, goals), ends - begin + drifts(on_time, self._ended)[0], never))
         if mine:
-            rows.append((near(goal, starts), -never, begins - end + drifts(path.end_drifts, [on_time] * len(ends))[1]))
-            sooner, later = drifts(path.end_drifts, ended)
+            rows.append((near(goal, starts), -never, begins - end + drifts(path.end_drifts, on_time)[1]))
+            sooner, later = drifts(path.end_drifts, self._ended)
             rows.append((lands & near(goal, goals), ends - end - clear + sooner, ends - end + clear + later))
         who = np.concatenate([np.flatnonzero(hit) for hit, _, _ in rows])
         low = np.concatenate([a[hit] for hit, a, _ in rows])
