@@ -14,6 +14,7 @@ import numpy as np
 from gcsplan.arrays import Bools, Floats
 from gcsplan.errors import LimitValues, NoMission, NoMissionReason
 from gcsplan.notes.note import Note
+from gcsplan.planners.airspeed import Airspeed
 from gcsplan.planners.budget import Budget
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.geometry.limits import Limits
@@ -80,7 +81,7 @@ class Problem:
     beside the problem's own, in the plane and in altitude. See docs/concepts/certificates.md.
 
     ``speed_m_s`` over ground and the rates of climb and descent are the fastest, and count for the objective ``time``
-    alone.
+    alone. A fixed wing has an ``airspeed`` as well, which decides how long its legs take.
 
     Metres only: a planner never sees a degree. ``options`` are keys that only some planners know:
     the swarms' ``encoding``, ``cost``, ``points``, ``population``, ``iterations``, ``evaluations``, ``parameters``.
@@ -105,6 +106,7 @@ class Problem:
     speed_m_s: float = 15.0
     climb_m_s: float = 2.5
     descent_m_s: float = 1.5
+    airspeed: Airspeed | None = None
     turn_radius_m: float = 0.0
     seed: int = 1
     gap_percent: float = 0.1
@@ -160,8 +162,8 @@ class Problem:
 
     def at_full_speed(self, limits: Limits) -> Limits:
         """``limits``; for the objective ``time`` with no slope on which a rate of climb or descent takes speed away.
-        A bound of paths within them holds of all: docs/concepts/bound.md#time."""
-        if self.objective != "time":
+        A bound of paths within them holds of all: docs/concepts/bound.md#time. With an ``airspeed`` they stay."""
+        if self.objective != "time" or self.airspeed is not None:
             return limits
         up, down = (math.degrees(math.atan(rate / self.speed_m_s)) for rate in (self.climb_m_s, self.descent_m_s))
         return replace(
@@ -196,15 +198,17 @@ class Problem:
     def leg_costs(self, start: Floats, end: Floats) -> Floats:
         """(...) costs of straight legs between points (..., 3); `cost` of a path is their sum."""
         d = end - start
-        return self.slope_costs(np.hypot(d[..., 0], d[..., 1]), d[..., 2])
+        return self.slope_costs(np.hypot(d[..., 0], d[..., 1]), d[..., 2], 0.5 * (start[..., 2] + end[..., 2]))
 
-    def slope_costs(self, run_m: Floats | float, rise_m: Floats | float) -> Floats:
+    def slope_costs(self, run_m: Floats | float, rise_m: Floats | float, amsl_m: Floats | float = 0.0) -> Floats:
         """(...) costs of straight legs by their metres of track and the metres that they rise, below 0 where they
         descend. A leg costs no more than any other way between its ends, because costs grow in proportion to a leg and
-        are convex in both numbers."""
+        are convex in both numbers; but for an ``airspeed``, whose legs have their middles at ``amsl_m``."""
         if self.objective == "energy":
             return np.asarray(self.horizontal_j_per_m * run_m + self.vertical_j_per_m * np.abs(rise_m))
         if self.objective == "time":
+            if self.airspeed is not None:
+                return self.airspeed.leg_s(run_m, rise_m, amsl_m)
             rise_s = np.maximum(np.divide(rise_m, self.climb_m_s), np.divide(rise_m, -self.descent_m_s))
             return np.maximum(np.divide(run_m, self.speed_m_s), rise_s)
         return np.asarray(np.hypot(run_m, rise_m))
@@ -368,6 +372,13 @@ def lowest_amsl(air: Airspace, east_m: float, north_m: float, limits: Limits) ->
 def straight_way_m(problem: Problem) -> float:
     """Length in metres of the straight track from terminal to terminal."""
     return sum(math.dist(a, b) for a, b in pairwise(terminals_of(problem)))
+
+
+def ceiling_m(problem: Problem, limits: Limits) -> float:
+    """The highest altitude AMSL that ``limits`` allow anywhere over the problem's surface; inf if they have no maximum."""
+    agl_m, amsl_m = limits.max_agl_m, limits.max_amsl_m
+    over_ground_m = math.inf if agl_m is None else float(np.nanmax(problem.airspace.surface.ground_m)) + agl_m
+    return over_ground_m if amsl_m is None else min(amsl_m, over_ground_m)
 
 
 def straight_bound(problem: Problem, rounding_m: tuple[float, float] = (0.0, 0.0)) -> float:

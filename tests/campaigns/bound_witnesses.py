@@ -25,6 +25,7 @@ from gcsplan.mavlink.mission.mission import GLOBAL, RELATIVE, TERRAIN, Mission, 
 from gcsplan.mission_file import MissionFile
 from tests.campaigns.bound_paths import FINER, Air, ground_track, sampled, shortest_track, taut
 from tests.campaigns.bound_worlds import Barrier, Case
+from tests.oracles.optima_polish import thinner
 
 LEG_M = 250.0
 """Longest leg of a drawn track: the check widens legs by their bow, which is a millimetre on such a leg."""
@@ -179,8 +180,14 @@ class Route:
         if self.case.objective == "length":
             return verdict.length_m
         if self.case.objective == "time":
-            fast, up, down = self.request["speed_m_s"][1], self.request["climb_m_s"], self.request["descent_m_s"]  # type: ignore[index]
+            fast = self.request["speed_m_s"][1]  # type: ignore[index]
+            up, down = (float(self.request.get(key, math.inf)) for key in ("climb_m_s", "descent_m_s"))  # type: ignore[arg-type]
             rises = [(leg, leg.end[2] - leg.start[2]) for leg in verdict.path_legs]
+            if "turn_radius_m" in self.request:
+                return math.fsum(
+                    max(leg.length_m / fast, z / up, -z / down) * leg.times / thinner(0.5 * (leg.start[2] + leg.end[2]))
+                    for leg, z in rises
+                )
             return math.fsum(max(leg.horizontal_m / fast, z / up, -z / down) * leg.times for leg, z in rises)
         return math.fsum((leg.energy_j - leg.hold_j) * leg.times for leg in verdict.legs if leg.on_path)
 

@@ -79,11 +79,13 @@ class Case:
     """Above 0: the free part of the plane within so many metres around all is written as keep-in areas, no zone is."""
 
     def timed(self, family: str) -> Case:
-        """The same world with the objective time and rates of climb and descent; a wing becomes a copter."""
+        """The same world with the objective time and rates of climb and descent; half of the wings climb as steeply as
+        their slopes allow."""
         rng = np.random.default_rng([self.seed, 52, *family.encode()])
         rates = {key: float(rng.choice([0.5, 1.5, 3.0])) for key in ("climb_m_s", "descent_m_s")}
         frame = "relative" if self.altitude_frame == "terrain" else self.altitude_frame
-        vehicles = [{k: x for k, x in v.items() if k != "turn_radius_m"} | rates for v in self.vehicles]
+        wing_rates = rates if rng.random() < 0.5 else {}
+        vehicles = [v | (wing_rates if "turn_radius_m" in v else rates) for v in self.vehicles]
         return replace(self, family=family, objective="time", altitude_frame=frame, vehicles=vehicles)
 
     def areas(self) -> list[Floats]:
@@ -592,7 +594,7 @@ FAMILIES: dict[str, Callable[[np.random.Generator], Case]] = {
         walls, slits, over, climbs, mountains, holes, stops, fleets, wings, returns, frames, bends, insides, banded,
     )
 }  # fmt: skip
-TIMED = tuple(f"{name}+time" for name in FAMILIES if name not in ("wings", "frames"))
+TIMED = tuple(f"{name}+time" for name in FAMILIES if name != "frames")
 
 
 def make(family: str, seed: int) -> Case:

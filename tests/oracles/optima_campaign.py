@@ -3,7 +3,8 @@
 As a module: ``python -m tests.oracles.optima_campaign --seeds 0 500 --families passes climbs --effort patient``. It
 prints every mission on which something is wrong, and at the end a table of figures by family. It runs every family on
 one seed before the next seed, so a campaign ended by ``--minutes`` or Ctrl-C has covered all families equally.
-``--time``: with the objective time in place of each mission's own, at speeds drawn for it (`in_time`).
+``--time``: with the objective time in place of each mission's own, at speeds drawn for it (`in_time`); ``--airspeed``:
+at an airspeed (`at_airspeed`).
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from gcsplan.errors import NoMission
+from gcsplan.planners.airspeed import Airspeed
 from gcsplan.planners.optimal.planner import plan
 from gcsplan.planners.problem import Problem, Progress, Solution
 from gcsplan.world.airspace import Legs
@@ -148,6 +150,8 @@ def judge(
 
 def dearest_metre(p: Problem) -> float:
     """The most that a metre costs."""
+    if p.airspeed is not None:
+        return 1.0 / min(p.airspeed.indicated_m_s, p.airspeed.climb_m_s, p.airspeed.descent_m_s)
     if p.objective == "time":
         return 1.0 / min(p.speed_m_s, p.climb_m_s, p.descent_m_s)
     return 1.0 if p.objective == "length" else p.vertical_j_per_m + p.horizontal_j_per_m
@@ -159,6 +163,14 @@ def in_time(seed: int) -> dict[str, Any]:
     rates = rng.choice([0.5, 1.5, 2.5, 5.0, 15.0], 2).tolist()
     return {"objective": "time", "speed_m_s": float(rng.choice([5.0, 10.0, 15.0])), "climb_m_s": rates[0],
             "descent_m_s": rates[1]}  # fmt: skip
+
+
+def at_airspeed(seed: int) -> dict[str, Any]:
+    """The objective time of a fixed wing, with an airspeed for one seed, and rates that bind it or do not."""
+    rng = np.random.default_rng([seed, 53])
+    fast = float(rng.choice([8.0, 15.0, 30.0]))
+    rates = rng.choice([math.inf, 0.3, 0.1], 2, p=[0.6, 0.2, 0.2]) * fast
+    return {"objective": "time", "airspeed": Airspeed(fast, *rates.tolist()), "speed_m_s": 2.0 * fast}
 
 
 def reverse(p: Problem) -> Problem:
@@ -175,6 +187,8 @@ def exact_past_discs(case: Case) -> float:
     assert case.discs is not None
     flat = shortest_past_discs(p.start[:2], p.goal[:2], case.discs)
     rise = abs(p.goal[2] - p.start[2])
+    if p.airspeed is not None:
+        return math.nan
     if p.objective == "time":
         return max(flat / p.speed_m_s, rise / (p.climb_m_s if p.goal[2] > p.start[2] else p.descent_m_s))
     if p.objective == "energy":
@@ -270,6 +284,7 @@ def main() -> None:
     )
     parser.add_argument("--budget", type=float, help="the planner's budget_s, to set on a busy machine")
     parser.add_argument("--time", action="store_true", help="with the objective time")
+    parser.add_argument("--airspeed", action="store_true", help="with the objective time of a fixed wing")
     parser.add_argument("--minutes", type=float, default=math.inf, help="start no mission after this many minutes")
     given = parser.parse_args()
     changes = {} if given.budget is None else {"budget_s": given.budget}
@@ -280,7 +295,7 @@ def main() -> None:
             before = time.perf_counter()
             if before - begun > 60.0 * given.minutes:
                 break
-            more = in_time(seed) if given.time else {}
+            more = at_airspeed(seed) if given.airspeed else in_time(seed) if given.time else {}
             v = judge(family, seed, PATIENT if given.effort == "patient" else QUICK, **changes, **more)
             v.judging_s = time.perf_counter() - before - v.planning_s
             verdicts.append(v)

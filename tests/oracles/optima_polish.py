@@ -11,6 +11,7 @@ import math
 import time
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,10 +64,20 @@ def is_feasible(problem: Problem, points: Floats) -> bool:
     )
 
 
+def thinner(amsl_m: Any) -> Any:
+    """True airspeed per indicated one, by the temperature and the pressure of the standard atmosphere."""
+    warm = 1.0 - 0.0065 * amsl_m / 288.15
+    return 1.0 / np.sqrt(warm ** (9.80665 / (287.053 * 0.0065)) / warm)
+
+
 def leg_costs(problem: Problem, a: Floats, b: Floats) -> Floats:
     """Metres, joules or seconds of legs (..., 3) to (..., 3)."""
     d = b - a
     flat = np.hypot(d[..., 0], d[..., 1])
+    if problem.objective == "time" and problem.airspeed is not None:
+        fast, rise = problem.airspeed, d[..., 2]
+        times = np.hypot(flat, rise) / fast.indicated_m_s, rise / fast.climb_m_s, -rise / fast.descent_m_s
+        return np.asarray(np.maximum.reduce(times) / thinner(0.5 * (a[..., 2] + b[..., 2])))
     if problem.objective == "time":
         times = flat / problem.speed_m_s, d[..., 2] / problem.climb_m_s, -d[..., 2] / problem.descent_m_s
         return np.asarray(np.maximum.reduce(times))

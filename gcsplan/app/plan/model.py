@@ -9,6 +9,8 @@ from datetime import datetime
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, cast
 
+import numpy as np
+
 from gcsplan.app.plan.left_out import LeftOut
 from gcsplan.arrays import Floats
 from gcsplan.check.verdict import Verdict
@@ -137,8 +139,10 @@ class VehiclePlan:
         speed, without what corners, speeding up and braking take."""
         if self.problem.objective == "time":
             legs = self.verdict.path_legs
-            times = ((self.problem.slope_costs(leg.horizontal_m, leg.end[2] - leg.start[2]), leg.times) for leg in legs)
-            return math.fsum(float(leg_s) * rounds for leg_s, rounds in times)
+            amsl_m = np.array([(leg.start[2], leg.end[2]) for leg in legs]).reshape(-1, 2)
+            run_m, times = np.array([(leg.horizontal_m, leg.times) for leg in legs]).reshape(-1, 2).T
+            seconds = self.problem.slope_costs(run_m, np.diff(amsl_m)[:, 0], amsl_m.mean(axis=1))
+            return math.fsum((seconds * times).tolist())
         return self.verdict.path_energy_j if self.problem.objective == "energy" else self.verdict.length_m
 
     @property

@@ -20,6 +20,7 @@ from gcsplan.mavlink.mission.autopilots import profile_of
 from gcsplan.mavlink.mission.mission import Home, Mission
 from gcsplan.mission_file import MissionFile, VehicleRequest
 from gcsplan.notes.note import Note
+from gcsplan.planners.airspeed import Airspeed
 from gcsplan.planners.problem import Problem, Progress, Refusal, Solution, Via, lowest_amsl
 from gcsplan.planners.refusal.suggestions import FILLED
 from gcsplan.units import METRIC
@@ -191,6 +192,7 @@ def make_problem(
     limits = _less_steep(limits, margins.slope + _slope_margin(source, request, limits, abs(goal_amsl - start_amsl)))
     settings = source.planner
     own = world.airspace.zones[len(source.zones) :]
+    fast_wing = objective == "time" and vehicle.keeps_airspeed
     wider = Wider(source, world, request, own, objective, seed, given)
     problem = Problem(
         airspace=air,
@@ -203,9 +205,10 @@ def make_problem(
         objective=objective,  # type: ignore[arg-type]
         vertical_j_per_m=vehicle.energy.vertical_j_per_m,
         horizontal_j_per_m=least_horizontal_j_per_m(vehicle, request.start_deg[0]),
-        speed_m_s=vehicle.fastest_over_ground_m_s(vehicle.speed_max_m_s, start_amsl),
+        speed_m_s=vehicle.fastest_over_ground_m_s(vehicle.speed_max_m_s, top_of(vehicle)),
         climb_m_s=vehicle.climb_m_s,
         descent_m_s=vehicle.descent_m_s,
+        airspeed=Airspeed(vehicle.speed_max_m_s, vehicle.climb_m_s, vehicle.descent_m_s) if fast_wing else None,
         turn_radius_m=vehicle.turn_radius_m,
         seed=seed,
         gap_percent=settings.gap_percent,
@@ -221,16 +224,21 @@ def make_problem(
     return problem, tuple(notes)
 
 
+def top_of(vehicle: Vehicle) -> float:
+    """An altitude AMSL, m, above which the vehicle is no faster or may not fly."""
+    return TROPOPAUSE_M if vehicle.limits.max_amsl_m is None else vehicle.limits.max_amsl_m
+
+
 def least_horizontal_j_per_m(vehicle: Vehicle, home_lat_deg: float) -> float:
     """The least that a horizontal metre takes in still air, J: what is minimised, and bounded from below.
 
     With a base power a metre takes it for no less time than at the fastest speed over ground. Climbs, corners and stops
     take longer, which counts in the flight's energy and not here.
     """
-    energy, top_amsl_m = vehicle.energy, vehicle.limits.max_amsl_m
+    energy = vehicle.energy
     if not energy.base_w:
         return energy.horizontal_j_per_m
-    fastest = vehicle.fastest_over_ground_m_s(vehicle.speed_max_m_s, TROPOPAUSE_M if top_amsl_m is None else top_amsl_m)
+    fastest = vehicle.fastest_over_ground_m_s(vehicle.speed_max_m_s, top_of(vehicle))
     if vehicle.lays_curves:  # towards the equator ArduPilot's own metres of longitude are too long
         near, far = (math.radians(max(abs(home_lat_deg) - part * FARTHEST_DEG, 0.0)) for part in (0.5, 1.0))
         fastest *= math.cos(far) / math.cos(near)
@@ -240,8 +248,8 @@ def least_horizontal_j_per_m(vehicle: Vehicle, home_lat_deg: float) -> float:
 def _require_times(source: MissionFile, vehicle: Vehicle) -> None:
     """Raise InputError where the objective ``time`` knows no time of a leg."""
     words = ""
-    if vehicle.turn_radius_m > 0.0:
-        words = f"{vehicle.name} is a fixed wing, whose time depends on wind and thin air"
+    if vehicle.blows_m_s:
+        words = f"{vehicle.name} is a fixed wing, whose speed over ground depends on its course in the declared winds"
     elif math.isinf(vehicle.climb_m_s + vehicle.descent_m_s):
         words = f"climb_m_s and descent_m_s do not both bound {vehicle.name}, whose fastest path is the shortest then"
     elif source.altitude_frame == "terrain":

@@ -355,7 +355,7 @@ def bound_between(
     if bound is None:
         bound = straight_bound(outer, outer.rounding_m)
     ends_m = cut_off_m(points, start, goal, vehicle.turn_radius_m)
-    return max(bound - ends_m * (1.0 if inner.rates is None else inner.rates[0]), 0.0)
+    return max(bound - float(inner.slope_costs(ends_m, 0.0, float(points[:, 2].min()))), 0.0)
 
 
 def _order(brief: Brief, request: VehicleRequest, start: FlightEnd, goal: FlightEnd | None) -> Order:

@@ -22,6 +22,7 @@ Each search is a module of `searches`; the governor chooses among them (`loop/go
 
 from __future__ import annotations
 
+import contextlib
 import math
 from dataclasses import replace
 
@@ -30,12 +31,14 @@ import numpy as np
 from gcsplan.arrays import Bools, Floats
 from gcsplan.errors import NoMission
 from gcsplan.notes.note import Note
+from gcsplan.planners.airspeed import Airspeed
+from gcsplan.planners.border import exit_cost
 from gcsplan.planners.optimal.loop.governor import govern
 from gcsplan.planners.optimal.loop.workspace import Workspace
 from gcsplan.planners.optimal.plane.incumbent import Incumbent
 from gcsplan.planners.optimal.table import all_searches, kinds, left_out
 from gcsplan.planners.optimal.window import plan_over
-from gcsplan.planners.problem import Problem, Refusal, Solution, terminals_of
+from gcsplan.planners.problem import Problem, Progress, Refusal, Solution, ceiling_m, terminals_of
 from gcsplan.planners.profile.climb_laps import on_the_spot
 from gcsplan.planners.refusal.explain import check_ends, explain
 from gcsplan.world.geometry.limits import Limits
@@ -52,11 +55,54 @@ def plan(problem: Problem) -> Solution:
     ``options``: ``without``, names of searches to leave out. If no path is found, raises Refusal (a NoMission), which
     names the binding constraint and whether it is proved that there is no path.
     """
+    if problem.objective == "time" and problem.airspeed is not None:
+        return _at_airspeed(problem, problem.airspeed)
     problem = replace(problem, budget=problem.budget.anew(problem.budget_s, problem.budget_mb))
     found = plan_over(problem, _within)
     # The searches bound paths between the exact ends; the mission's ends may lie beside them.
     bound = None if found.lower_bound is None else problem.rounding().bound(found.lower_bound)
     return replace(found, lower_bound=bound)
+
+
+def _at_airspeed(problem: Problem, airspeed: Airspeed) -> Solution:
+    """`plan` for the least time of a fixed wing: the shortest path, which `turns` flies as high as is worth it; or the
+    shortest one that is flown at full speed, if its rates of climb and descent bind."""
+    shorter = replace(problem, objective="length", progress=None)
+
+    def told(now: Progress) -> None:
+        assert problem.progress is not None
+        cost = None if now.path is None else airspeed.path_s(now.path.points)
+        bound = None if now.lower_bound is None else _least_s(shorter, airspeed, now.lower_bound)
+        problem.progress(replace(now, cost=cost, lower_bound=bound))
+
+    found = plan(replace(shorter, progress=None if problem.progress is None else told))
+    bound = None
+    if found.lower_bound is not None:
+        bound = _least_s(replace(found.problem or shorter, objective="length"), airspeed, found.lower_bound)
+    cost = airspeed.path_s((found.flown or found.path).points)
+    gentle = airspeed.at_full_speed(shorter.limits)
+    if gentle != shorter.limits:
+        with contextlib.suppress(NoMission):
+            other = plan(replace(shorter, limits=gentle, checked=None, widen=None))
+            other_s = airspeed.path_s((other.flown or other.path).points)
+            found, cost = (other, other_s) if other_s < cost else (found, cost)
+    far = bound is None or cost > bound * (1.0 + problem.gap_percent / 100.0)
+    return replace(
+        found,
+        lower_bound=bound,
+        problem=None if found.problem is None else replace(found.problem, objective="time", progress=problem.progress),
+        stopped_by="exhausted" if far and found.stopped_by == "gap" else found.stopped_by,
+    )
+
+
+def _least_s(over: Problem, airspeed: Airspeed, length_m: float) -> float:
+    """No path of a fixed wing takes less if none is shorter than ``length_m``; ``over``: the problem for lengths."""
+    limits, ends, off_m = over.bound_limits, (over.start[2], over.goal[2]), over.rounding_m[1]
+    within_s = airspeed.least_s(length_m, ends, limits, ceiling_m(over, limits), off_m)
+    # Beyond the terrain that is loaded the ground may be higher, but that is far.
+    beyond = ceiling_m(over, replace(limits, max_agl_m=None))
+    far_m = max(length_m, over.rounding().bound(exit_cost(over)))
+    return min(within_s, airspeed.least_s(far_m, ends, limits, beyond, off_m))
 
 
 def _within(problem: Problem) -> Solution:

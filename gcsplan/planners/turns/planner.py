@@ -25,9 +25,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Indices
-from gcsplan.planners.problem import Problem
+from gcsplan.planners.airspeed import Airspeed
+from gcsplan.planners.problem import Problem, ceiling_m
 from gcsplan.planners.simplify import thinned
 from gcsplan.planners.turns.arc_path import ArcPath, inserted, lacking_m, missed_m, through, unlooped
+from gcsplan.planners.turns.profile import Risen, rise
 from gcsplan.planners.turns.repair import Patience, Tried, cost_of, mended, polished
 from gcsplan.world.geometry.path import Path, distances_m
 
@@ -99,6 +101,10 @@ OUT_M = 0.3
 WORTH, GOOD, DEAR = 3e-3, 1e-2, 3e-2
 """Extra cost over the path with corners, as a part, above which the result is polished; above which the next arc path
 is tried; and above which a path with more clearance is planned."""
+
+LIFTS, STEEP, BELOW_M = 12, 0.999, 0.1
+"""Altitudes at which a flight is tried to be faster; the part of the slope limits at which it climbs there; and metres
+that it stays below the ceiling."""
 
 TRIES = 1000
 """Most tracks tried in each repair and in each polishing of an arc path."""
@@ -176,7 +182,31 @@ def _rounded(problem: Problem, points: Floats, pinned: Bools) -> Rounded | None:
             break
     if best is None or best.risen is None:
         return None
-    return Rounded(best.risen.way_points, best.risen.flown, cost)
+    risen = best.risen if problem.airspeed is None else lifted(problem, problem.airspeed, best)
+    return Rounded(risen.way_points, risen.flown, cost_of(problem, risen))
+
+
+def lifted(problem: Problem, airspeed: Airspeed, here: Tried) -> Risen:
+    """The fastest of some flights over the track of a legal one, which climb into thinner air, and of that one, which
+    stays where nothing limits its altitude."""
+    track, line, limits = here.track, here.line, problem.limits
+    assert track is not None
+    assert line is not None
+    assert here.risen is not None
+    begin_m, end_m = problem.start[2], problem.goal[2]
+    if math.isinf(ceiling_m(problem, limits)):
+        return here.risen
+    up, down = limits.max_climb_slope * STEEP, limits.max_descent_slope * STEEP
+    long_m = float(track.s_m[-1])
+    top_m = (long_m + begin_m / up + end_m / down) / (1.0 / up + 1.0 / down)
+    top_m = min(top_m, ceiling_m(problem, limits) - limits.altitude_error_m - BELOW_M)
+    flights = [here.risen]
+    for amsl_m in np.linspace(max(begin_m, end_m), top_m, LIFTS + 1)[1:].tolist() if top_m > begin_m else ():
+        places = (amsl_m - begin_m) / up, long_m - (amsl_m - end_m) / down
+        found = rise(problem, track, line, [(s_m, amsl_m, math.inf) for s_m in places])
+        if isinstance(found, Risen):
+            flights.append(found)
+    return min(flights, key=lambda risen: airspeed.path_s(risen.flown, np.diff(risen.true_m)))
 
 
 def _arc_paths(problem: Problem, points: Floats, pinned: Bools) -> Iterator[ArcPath]:

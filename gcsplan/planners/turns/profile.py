@@ -8,6 +8,7 @@ arcs, and does not bend there.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -37,9 +38,14 @@ class Risen:
     way_points: Floats
 
 
-def rise(problem: Problem, track: Track, line: Outline) -> Risen | Obstruction:
-    """The cheapest legal flight over ``line`` and its ``track``, checked exactly; or the obstruction, if none is."""
-    known: list[tuple[float, float, float]] = []
+def rise(
+    problem: Problem, track: Track, line: Outline, doors: Sequence[tuple[float, float, float]] = ()
+) -> Risen | Obstruction:
+    """The cheapest legal flight over ``line`` and its ``track``, checked exactly; or the obstruction, if none is.
+
+    ``doors`` (s_m, low_m, high_m) are altitudes to pass besides.
+    """
+    known = list(doors)
     blocked = Obstruction("pinched", 0.0, 0.0, 0.0)
     for _ in range(CORRECTIONS):
         found = fly(problem, track, known=known)
@@ -49,7 +55,7 @@ def rise(problem: Problem, track: Track, line: Outline) -> Risen | Obstruction:
         s, flown, widen = _dense(line, nodes)
         violations = problem.airspace.examine(_legs(problem, flown, widen), problem.limits).violations
         if not violations:
-            nodes = _thinned(problem, line, nodes)
+            nodes = _thinned(problem, line, nodes, [s_m for s_m, _, _ in doors])
             s, flown, _ = _dense(line, nodes)
             flown[0], flown[-1] = problem.start, problem.goal
             return Risen(flown, np.interp(s, line.s_m, line.true_m), _way_points(line, nodes))
@@ -165,9 +171,10 @@ def _legs(problem: Problem, flown: Floats, widen: Floats) -> Legs:
     return replace(plain, track_error_m=plain.track_error_m + widen)
 
 
-def _thinned(problem: Problem, line: Outline, nodes: Floats) -> Floats:
-    """Drop bends of a profile that it does not need to be legal, which never lengthens it; pinned altitudes stay."""
-    pins = line.s_m[line.pins[np.isfinite(line.pin_m)]]
+def _thinned(problem: Problem, line: Outline, nodes: Floats, doors: Sequence[float]) -> Floats:
+    """Drop bends of a profile that it does not need to be legal, which never lengthens it; pinned altitudes and those
+    at ``doors``, metres along, stay."""
+    pins = np.concatenate([line.s_m[line.pins[np.isfinite(line.pin_m)]], np.asarray(doors, dtype=np.float64)])
     for first in (1, 2, 1, 2):
         drop = np.zeros(len(nodes), bool)
         drop[first : len(nodes) - 1 : 2] = True

@@ -56,6 +56,10 @@ def on_a_hill(vehicle: dict[str, object], objective: str, **keys: object) -> str
     )  # fmt: skip
 
 
+WING = {
+    "autopilot": "arduplane", "turn_radius_m": 60, "speed_m_s": [14, 15], "end": "loiter", "takeoff_heading_deg": 0,
+    "max_climb_deg": 10, "max_descent_deg": 10, "goal": {"east_m": 5000, "north_m": 0},
+}  # fmt: skip
 RATES = {"climb_m_s": 2.5, "descent_m_s": 1.5}
 
 
@@ -72,9 +76,18 @@ def test_the_fastest_plan_tells_its_time_its_bound_and_the_gap() -> None:
     assert fast["path_time_s"] < fast["arrive_s"] < short["arrive_s"] - 60.0
 
 
+@pytest.mark.slow
+def test_a_wings_fastest_plan_tells_its_time_in_thin_air() -> None:
+    (fast,), (short,) = (summary_of(plan(on_a_hill(WING, goal)))["vehicles"] for goal in ("time", "length"))
+    assert fast["lower_bound_m"] is None
+    assert fast["lower_bound_s"] <= fast["path_time_s"] < fast["length_m"] / 15.0
+    assert fast["gap_percent"] == pytest.approx(100.0 * (fast["path_time_s"] / fast["lower_bound_s"] - 1.0))
+    assert fast["path_time_s"] <= short["length_m"] / 15.0
+
+
 @pytest.mark.parametrize(
     ("vehicle", "keys", "why"),
-    [({"autopilot": "arduplane", "turn_radius_m": 60}, {}, "fixed wing"), ({}, {}, "climb_m_s and descent_m_s"),
+    [(WING, {"wind": {"from_deg": 270, "speed_m_s": 3}}, "fixed wing"), ({}, {}, "climb_m_s and descent_m_s"),
      (RATES, {"altitude_frame": "terrain"}, "altitude_frame terrain")],
 )  # fmt: skip
 def test_a_fastest_path_that_is_not_known_is_refused_with_its_cure(
