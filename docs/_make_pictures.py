@@ -3,7 +3,8 @@
 They are in `docs/pictures/`. `report.webp` is the top of the page that ``gcsplan plan --report`` writes, in Chromium.
 `map.webp` is the page of ``gcsplan map`` with the same mission.
 `optimal.png` is the default planner's proof: terrain above the cap, and the cells that a shorter path could meet.
-Each picture holds the path's length in its description, which a test compares with a plan.
+Each of these holds the path's length in its description, which a test compares with a plan.
+`ib-abc-wind.webp` and `msfoa-wind.webp` are charts of two papers' fleets in declared winds (`FLEETS`).
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from pathlib import Path
 from typing import IO
 
 import numpy as np
+import yaml
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import LightSource, ListedColormap
 from matplotlib.figure import Figure
@@ -32,9 +34,17 @@ from tests.support import browser
 TOP = Path(__file__).parents[1]
 PICTURES = TOP / "docs" / "pictures"
 WALL, ROOM = "#b04a3a", "#2c7fb8"
-PAGE_PX = 1100
+PAGE_PX, CHART_PX = 1100, 900
 MAP_PX = 1100, 740
 """Width of the page in the picture; its height ends below the map's legend."""
+FLEETS: dict[str, tuple[str, dict[str, object]]] = {
+    "ib-abc-wind.webp": ("ib-abc-sequence", {"wind": {"up_to_m_s": 15}, "arrival": {
+        "mode": "sequence", "order": ["uav1", "uav2", "uav3", "uav4"], "interval_s": 9, "window_s": 3,
+        "separation_m": 20}}),
+    "msfoa-wind.webp": ("msfoa-2", {"wind": {"up_to_m_s": 4}, "arrival": {
+        "mode": "sequence", "order": ["uav1", "uav2", "uav3"], "interval_s": 20, "window_s": 8, "separation_m": 20}}),
+}  # fmt: skip
+"""The papers' fleets in docs/research/papers-wind.md: the mission of each, and the keys that differ."""
 
 
 def main() -> None:
@@ -53,6 +63,36 @@ def main() -> None:
     ):
         (PICTURES / name).write_bytes(content)
         print(f"{PICTURES / name}: {len(content):,} bytes")
+    for name, (mission, keys) in FLEETS.items():
+        document = yaml.safe_load((TOP / "missions" / "papers" / f"{mission}.yaml").read_text(encoding="utf-8"))
+        fleet = plan(load_mission(yaml.safe_dump(document | keys, sort_keys=False)))
+        (PICTURES / name).write_bytes(picture_of_bands(gcsplan.report(fleet), arrivals(fleet)))
+        print(f"{PICTURES / name}: {arrivals(fleet)}")
+
+
+def arrivals(fleet: gcsplan.Plan) -> str:
+    """When each vehicle of a fleet arrives in still air, and from when to when in the declared winds, s."""
+    assert fleet.fleet is not None
+    slots = [(v, fleet.fleet.slot(v.name)) for v in fleet.vehicles]
+    rows = [(slot, v.verdict.arrive_window_s(slot) or (slot.arrive_s, slot.arrive_s)) for v, slot in slots]
+    return "; ".join(f"{s.name} at {s.arrive_s:.1f} s, within {low:.1f} to {high:.1f} s" for s, (low, high) in rows)
+
+
+def picture_of_bands(html: str, description: str) -> bytes:
+    """A report's chart of the way flown over time, with its words, as WebP with a description."""
+    with tempfile.TemporaryDirectory() as folder, browser.browser(program(), Path(folder, "home")) as shown:
+        file = Path(folder, "report.html")
+        file.write_text(html, encoding="utf-8")
+        alone = (
+            "(() => { const chart = document.querySelector('#distance'), style = chart.nextElementSibling; "
+            "document.body.replaceChildren(chart, style, style.nextElementSibling); "
+            "return document.body.lastChild.getBoundingClientRect().bottom })()"
+        )
+        shown.visit(file, width=CHART_PX)
+        bottom = round(shown.evaluate(alone))
+        shown.visit(file, width=CHART_PX, height=bottom + 16)
+        shown.evaluate(alone)
+        return webp(shown.picture(), description)
 
 
 def picture_of_page(html: str, description: str) -> bytes:

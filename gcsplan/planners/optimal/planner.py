@@ -69,13 +69,13 @@ def _at_airspeed(problem: Problem, airspeed: Airspeed) -> Solution:
     shortest one that is flown at full speed, if its rates of climb and descent bind."""
     shorter = replace(problem, objective="length", progress=None)
 
-    def told(now: Progress) -> None:
+    def in_seconds(now: Progress) -> None:
         assert problem.progress is not None
         cost = None if now.path is None else airspeed.path_s(now.path.points)
         bound = None if now.lower_bound is None else _least_s(shorter, airspeed, now.lower_bound)
         problem.progress(replace(now, cost=cost, lower_bound=bound))
 
-    found = plan(replace(shorter, progress=None if problem.progress is None else told))
+    found = plan(replace(shorter, progress=None if problem.progress is None else in_seconds))
     bound = None
     if found.lower_bound is not None:
         bound = _least_s(replace(found.problem or shorter, objective="length"), airspeed, found.lower_bound)
