@@ -12,6 +12,9 @@ from gcsplan.world.geodesy.atmosphere import TROPOPAUSE_M, true_per_indicated
 from gcsplan.world.geometry.limits import Limits
 
 _SLICES = 256
+_SPARE = 2e-8
+"""By how much a sine counts as larger, for a slope may be at its limit but for the rounding of its angle; and by how
+much a bound counts as lower, as a part of it, for the error of Simpson's rule."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,10 +27,15 @@ class Airspeed:
     descent_m_s: float = math.inf
 
     def leg_s(self, run_m: Floats | float, rise_m: Floats | float, amsl_m: Floats | float) -> Floats:
-        """(...) seconds of straight legs by their metres of track, their rise, and the altitude of their middle."""
+        """(...) seconds of straight legs by their metres of track, their rise, and the altitude of their middle.
+
+        Simpson's rule has the mean over their altitudes: at its middle a long leg would seem faster than its parts.
+        """
         along_s = np.divide(np.hypot(run_m, rise_m), self.indicated_m_s)
         rise_s = np.maximum(np.divide(rise_m, self.climb_m_s), np.divide(rise_m, -self.descent_m_s))
-        return np.asarray(np.maximum(along_s, rise_s) / true_per_indicated(amsl_m))
+        half_m = np.multiply(0.5, rise_m)
+        low, middle, high = (1.0 / true_per_indicated(np.add(amsl_m, off)) for off in (-half_m, 0.0, half_m))
+        return np.asarray(np.maximum(along_s, rise_s) * (low + 4.0 * middle + high) / 6.0)
 
     def path_s(self, points: Floats, run_m: Floats | None = None) -> float:
         """Seconds of the path through ``points`` (N, 3); ``run_m`` (N - 1,): its track, if that is longer."""
@@ -70,8 +78,5 @@ class Airspeed:
             until_m, until_s = (np.concatenate([[0.0], np.cumsum(x)])[_SLICES - 1 : -1] for x in (steps_m, passed_s))
             flown_m += until_m / sine
             lost_s += until_s - until_m / sine / fastest_m_s
-        return float((np.maximum(length_m, flown_m) / fastest_m_s + np.maximum(lost_s, 0.0)).min())
-
-
-_SPARE = 2e-8
-"""By how much a sine counts as larger: a slope may be at its limit but for the rounding of its angle."""
+        least_s = (np.maximum(length_m, flown_m) / fastest_m_s + np.maximum(lost_s, 0.0)).min()
+        return float(least_s * (1.0 - _SPARE))

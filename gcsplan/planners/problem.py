@@ -375,7 +375,7 @@ def straight_way_m(problem: Problem) -> float:
 
 
 def ceiling_m(problem: Problem, limits: Limits) -> float:
-    """The highest altitude AMSL that ``limits`` allow anywhere over the problem's surface; inf if they have no maximum."""
+    """The highest altitude AMSL that ``limits`` allow anywhere over the problem's surface; inf without a maximum."""
     agl_m, amsl_m = limits.max_agl_m, limits.max_amsl_m
     over_ground_m = math.inf if agl_m is None else float(np.nanmax(problem.airspace.surface.ground_m)) + agl_m
     return over_ground_m if amsl_m is None else min(amsl_m, over_ground_m)

@@ -77,7 +77,8 @@ def leg_costs(problem: Problem, a: Floats, b: Floats) -> Floats:
     if problem.objective == "time" and problem.airspeed is not None:
         fast, rise = problem.airspeed, d[..., 2]
         times = np.hypot(flat, rise) / fast.indicated_m_s, rise / fast.climb_m_s, -rise / fast.descent_m_s
-        return np.asarray(np.maximum.reduce(times) / thinner(0.5 * (a[..., 2] + b[..., 2])))
+        heights = a[..., 2] + np.linspace(0.0, 1.0, 33).reshape(-1, *[1] * rise.ndim) * rise
+        return np.asarray(np.maximum.reduce(times) * (1.0 / thinner(heights)).mean(axis=0))
     if problem.objective == "time":
         times = flat / problem.speed_m_s, d[..., 2] / problem.climb_m_s, -d[..., 2] / problem.descent_m_s
         return np.asarray(np.maximum.reduce(times))

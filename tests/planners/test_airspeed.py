@@ -80,7 +80,13 @@ def test_a_wings_leg_takes_as_long_as_the_model_of_motion_says() -> None:
         points = rng.uniform([0.0, 0.0, 0.0], [2000.0, 2000.0, 1500.0], (2, 3))
         way = legs(points, vehicle, np.zeros(1, dtype=np.intp))
         assert way is not None
-        assert fast.path_s(points) == pytest.approx(way.time_s(FAST_M_S), rel=1e-9)
+        assert fast.path_s(points) == pytest.approx(way.time_s(FAST_M_S), rel=2e-4)
+
+
+def test_a_leg_takes_as_long_as_its_parts() -> None:
+    fast, points = Airspeed(FAST_M_S, 2.0), np.array([[0.0, 0.0, 100.0], [9000.0, 0.0, 2600.0]])
+    parts = points[0] + np.linspace(0.0, 1.0, 500)[:, None] * (points[1] - points[0])
+    assert fast.path_s(points) == pytest.approx(fast.path_s(parts), rel=1e-8)
 
 
 @pytest.mark.slow

@@ -83,7 +83,8 @@ def _at_airspeed(problem: Problem, airspeed: Airspeed) -> Solution:
     gentle = airspeed.at_full_speed(shorter.limits)
     if gentle != shorter.limits:
         with contextlib.suppress(NoMission):
-            other = plan(replace(shorter, limits=gentle, checked=None, widen=None))
+            half_s = 0.5 * shorter.budget_s
+            other = plan(replace(shorter, limits=gentle, checked=None, widen=None, budget_s=half_s))
             other_s = airspeed.path_s((other.flown or other.path).points)
             found, cost = (other, other_s) if other_s < cost else (found, cost)
     far = bound is None or cost > bound * (1.0 + problem.gap_percent / 100.0)

@@ -200,8 +200,9 @@ def lifted(problem: Problem, airspeed: Airspeed, here: Tried) -> Risen:
     long_m = float(track.s_m[-1])
     top_m = (long_m + begin_m / up + end_m / down) / (1.0 / up + 1.0 / down)
     top_m = min(top_m, ceiling_m(problem, limits) - limits.altitude_error_m - BELOW_M)
+    low_m = max(begin_m, end_m)
     flights = [here.risen]
-    for amsl_m in np.linspace(max(begin_m, end_m), top_m, LIFTS + 1)[1:].tolist() if top_m > begin_m else ():
+    for amsl_m in np.linspace(low_m, top_m, LIFTS + 1)[1:].tolist() if top_m > low_m else ():
         places = (amsl_m - begin_m) / up, long_m - (amsl_m - end_m) / down
         found = rise(problem, track, line, [(s_m, amsl_m, math.inf) for s_m in places])
         if isinstance(found, Risen):
