@@ -172,7 +172,8 @@ def _bounded(
     if case.objective == "energy":
         per_m = max(v.request.vehicle.energy.horizontal_j_per_m, v.request.vehicle.energy.vertical_j_per_m)
     if case.objective == "time":
-        per_m = 1.0 / min(case.vehicles[0]["speed_m_s"][1], v.problem.climb_m_s, v.problem.descent_m_s)  # type: ignore[index]
+        fast = float(case.vehicles[0]["speed_m_s"][1])  # type: ignore[index]
+        per_m = 1.0 / min(fast, v.problem.climb_m_s, v.problem.descent_m_s)
         flown_s = math.fsum((leg.time_s - leg.hold_s) * leg.times for leg in v.verdict.path_legs)
         if flown_s < bound:
             tally.fault("flown", case, f"{v.name} is flown in {flown_s:.3f} s, and no path is below {bound:.3f} s")
