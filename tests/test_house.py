@@ -357,8 +357,8 @@ def test_a_function_fits_on_a_screen() -> None:
 MOST_IN_A_FOLDER = 15
 
 MOST = {
-    "modules": 502,
-    "statements": 72_055,
+    "modules": 506,
+    "statements": 73_121,
     "type names with two meanings": 0,
     "constants with two values": 1,
     "folders with more than 15 modules": 0,

@@ -46,7 +46,7 @@ FORECAST_AGL_M = 10, 80, 120
 BATTERY_J = 1e7
 RUNS_OF_FLEET = 5
 GATES = (1, 2, 3, "auto")
-START = datetime(2026, 11, 28, 10, 0, 0, tzinfo=UTC)
+DEPARTURE = datetime(2026, 11, 28, 10, 0, 0, tzinfo=UTC)
 """The common start of a fleet with gates, which is within the forecasts."""
 LANES_APART_DEG = 0.008
 """Distance of the starts, and of the goals, of neighbours in a fleet: 710 m or more, as wings circle at their goals."""
@@ -100,7 +100,7 @@ def run_fleets(fleets: int, *, seed: int = 1, tell: Callable[[str], None] | None
     for number in range(1, fleets + 1):
         with TemporaryDirectory() as folder:
             kind, document = fleet_of(seed, number, Path(folder))
-            planned = _planned(document, refused, START if "gates" in document["arrival"] else None)
+            planned = _planned(document, refused, DEPARTURE if "gates" in document["arrival"] else None)
         if planned is None:
             continue
         weather = weather_of(planned.source, None, None, 0.0, 0.0)

@@ -8,7 +8,7 @@ to the return's altitude are. So their sum exceeds a limit at most on two parts 
 finds where it crosses the limit, without sampling.
 
 In declared winds all of this is for the worst of them, and the return for its own worst; it stays convex
-(`flight.winds.WaysHome`).
+(`flight.ways_home.WaysHome`).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import Any
 
-from gcsplan.check.flight.winds import WaysHome
+from gcsplan.check.flight.ways_home import WaysHome
 from gcsplan.check.motion.return_rules import RETURN_RULES, return_s, speed_home_m_s
 from gcsplan.check.motion.stopping import detour_home_m
 from gcsplan.check.motion.stretch import Place, flat_m, offset_m

@@ -104,8 +104,7 @@ def judge(
     windy = blown is not None and blown.too_windy is None and not blown.wind.still
     costs = blown.costs_so_far if blown is not None and windy else None
     figures = _figures(flight, plane, report, vehicle, world, seconds, costs)
-    findings += _blown_away(blown)
-    findings += _missed_gates(flight, seconds, blown)
+    findings += [*_blown_away(blown), *_missed_gates(flight, seconds, blown)]
     findings += _findings(flight.stretches, plane, report, vehicle.limits, world)
     over = nearest_pass(flight.stretches, plane.legs, plane.owner, vehicle.limits, world)
     near = nearest_misses(flight.stretches, plane.legs, plane.owner, report, vehicle, world) if misses else ()

@@ -43,6 +43,7 @@ from gcsplan.mission_file.scene import (
     make_box,
     make_frame,
     make_place,
+    make_places,
     make_spec,
     make_zones,
     place_notes,
@@ -77,6 +78,7 @@ from gcsplan.mission_file.vehicles import (
     in_wind,
     make_arrival,
     make_vehicle,
+    one_speed,
     slopes_in_wind,
     unbounded_motion,
     within_lean,
@@ -264,11 +266,7 @@ class _MissionReading:
         names = check_unique(self._list("vehicles"), f"{self.where}vehicles", problems)
         arrival_keys = self._section(ArrivalKeys, "arrival")
         arrival = make_arrival(arrival_keys, names, f"{self.where}arrival", problems)
-        given = arrival_keys.gates if arrival_keys is not None and isinstance(arrival_keys.gates, list) else []
-        gates = [
-            make_place(p, f"{self.where}arrival.gates[{j}]", problems, self.notes, local=self.local)
-            for j, p in enumerate(given)
-        ]
+        gates = self._gates(arrival_keys)
         hours = self._hours()
         published, inside = self._zones(hours)
         drafts = used(published)
@@ -325,6 +323,11 @@ class _MissionReading:
         )  # fmt: skip
         _log.info("%s: %d vehicles, %d zones", self.content.where, len(source.vehicles), len(source.zones))
         return replace(source, wider=partial(site.wider, source), at_level=partial(site.at_level, source))
+
+    def _gates(self, arrival: ArrivalKeys | None) -> list[MissionPlace | None]:
+        """The gates that are given by their places."""
+        given = arrival.gates if arrival is not None and isinstance(arrival.gates, list) else []
+        return make_places(given, f"{self.where}arrival.gates", self.problems, self.notes, local=self.local)
 
     def zones_by_entry(self) -> dict[str, Sequence[ZoneDraft]]:
         """The zones of each entry that can be read, whatever is wrong with others."""
@@ -458,11 +461,8 @@ class _MissionReading:
                 self.problems.append(Mistake(f"{at}.turn_radius_m", words))
             start = make_place(keys.start, f"{at}.start", self.problems, self.notes, local=self.local)
             goal = make_place(keys.goal, f"{at}.goal", self.problems, self.notes, local=self.local)
-            via = [
-                make_place(p, f"{at}.via[{j}]", self.problems, self.notes, local=self.local)
-                for j, p in enumerate(keys.via)
-            ]
-            self.notes += [note.of(vehicle=keys.name) for note in (*own, *_one_speed(one, keys))]
+            via = make_places(keys.via, f"{at}.via", self.problems, self.notes, local=self.local)
+            self.notes += [note.of(vehicle=keys.name) for note in (*own, *one_speed(one, keys))]
             terminals.append(Terminals(keys, vehicle, start, goal, tuple(via)))
         return terminals
 
@@ -596,11 +596,3 @@ class _MissionReading:
         except InputError as why:
             self.problems += why.problems
             return None
-
-
-def _one_speed(given: Mapping[str, Any], keys: VehicleKeys) -> list[Note]:
-    """A note if one number stands for the slowest and the fastest speed."""
-    if isinstance(given.get("speed_m_s"), list | None):
-        return []
-    slow, fast = keys.speed_m_s
-    return [Note("one_speed", slow_m_s=slow, fast_m_s=fast)]

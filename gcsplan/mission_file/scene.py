@@ -94,6 +94,13 @@ def make_place(
     return MissionPlace(where, degrees, agl_m=point.agl_m)
 
 
+def make_places(
+    points: Sequence[Degrees | LocalPoint], where: str, problems: list[Mistake], notes: list[Note], *, local: bool
+) -> list[MissionPlace | None]:
+    """The points of a list of the file, as by `make_place`; ``where`` is its key."""
+    return [make_place(p, f"{where}[{i}]", problems, notes, local=local) for i, p in enumerate(points)]
+
+
 def place_notes(point: Degrees, where: str) -> list[Note]:
     """Notes for the user on how a place was read; ``where`` is its key behind the name of the file."""
     return [point.note.of(place=where.split(": ", 1)[-1])] if point.note else []

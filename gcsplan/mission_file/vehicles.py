@@ -6,7 +6,7 @@ Of a vehicle's energy, power in cruise and endurance become a base power (`make_
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import fields, replace
 from typing import Any
 
@@ -482,3 +482,11 @@ def _cruise_w(given: EnergyKeys) -> float | None:
     if given.endurance_s is not None and given.battery_j is not None:
         return given.battery_j / given.endurance_s
     return None
+
+
+def one_speed(given: Mapping[str, Any], keys: VehicleKeys) -> list[Note]:
+    """A note if one number stands for the slowest and the fastest speed."""
+    if isinstance(given.get("speed_m_s"), list | None):
+        return []
+    slow, fast = keys.speed_m_s
+    return [Note("one_speed", slow_m_s=slow, fast_m_s=fast)]

@@ -8,6 +8,7 @@ flies no faster than commanded. ``g`` is concave in the wind (`docs/concepts/win
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -16,7 +17,7 @@ import numpy as np
 from gcsplan.arrays import Floats, Indices
 from gcsplan.wind.declared import DeclaredWind
 
-__all__ = ["ADVANCES_M_S", "Ability", "SpeedBounds", "WindsAlong", "circle_ratio"]
+__all__ = ["ADVANCES_M_S", "Ability", "SpeedBounds", "WindsAlong", "circle_ratio", "winds_within"]
 
 ADVANCES_M_S = 0.1
 """An aircraft that is slower than this over ground does not advance."""
@@ -190,3 +191,23 @@ def circle_ratio(wind_m_s: float, air_m_s: float, most_m_s: float) -> float:
     g = wind_m_s * np.cos(angle) + np.sqrt(air_m_s**2 - (wind_m_s * np.sin(angle)) ** 2)
     still_m_s = min(most_m_s, air_m_s)
     return float(np.mean(still_m_s / np.minimum(g, most_m_s)))
+
+
+def winds_within(wind: DeclaredWind, ability: Ability, amsl_m: Floats, agl_m: Floats, hours_s: Floats) -> WindsAlong:
+    """The winds of a set, within heights and hours (P, 2): probes at the ends of these and at the set's own between."""
+    if len(wind.heights_m) == 1 and len(wind.times_s) == 1:
+        zero = np.zeros(len(amsl_m))
+        return WindsAlong(wind, ability, np.arange(len(amsl_m)), zero, zero, zero)
+    spans_m, rows = amsl_m if wind.heights == "amsl" else agl_m, []
+    for i, (span_m, span_s) in enumerate(zip(spans_m.tolist(), hours_s.tolist(), strict=True)):
+        heights, times = _between(span_m, wind.heights_m), _between(span_s, wind.times_s)
+        rows += [(i, h, t) for h in heights for t in times]
+    part, height, at = np.array(rows).reshape(-1, 3).T
+    return WindsAlong(wind, ability, part.astype(np.intp), height, height, at)
+
+
+def _between(span: Sequence[float], nodes: Floats) -> list[float]:
+    """The ends of a span, within ``nodes``, and the nodes inside."""
+    low, high = (min(max(x, float(nodes[0])), float(nodes[-1])) for x in span)
+    inside = nodes[(nodes > low) & (nodes < high)].tolist()
+    return [low, *inside, *([high] if high > low else [])]

@@ -33,9 +33,9 @@ __all__ = ["WHERE", "counts", "gated", "gates_bought", "no_time_of_day", "some_s
 WHERE = "arrival.gates"
 MOST_SOUGHT = 8
 """Most gates that `auto` tries."""
-REACH_M = 100.0
+BESIDE_WAY_M = 100.0
 """Metres within which a vehicle passes a place, to have a gate beside it."""
-APART_M = 200.0
+BETWEEN_GATES_M = 200.0
 """Least distance of gates on a way from each other, and from its ends, m."""
 GUESS_S = 600
 """Seconds between gates before it is known how long the flight to them takes."""
@@ -90,8 +90,8 @@ def gated(
     if not passes:
         able = [v for v in vehicles if waits_for_time(v.request.vehicle)]
         words = (
-            f"no vehicle passes within {REACH_M:g} m of a place, {APART_M:g} m from the ends of its way: give other "
-            "places, or how many gates each has"
+            f"no vehicle passes within {BESIDE_WAY_M:g} m of a place, {BETWEEN_GATES_M:g} m from the ends of its way: "
+            "give other places, or how many gates each has"
             if able
             else f"{vehicles[0].name} {no_time_of_day(vehicles[0].request.vehicle)}: leave gates out, and give a wider "
             "window_s"
@@ -114,17 +114,18 @@ def _places_m(v: VehiclePlan, gates: int | GatePlaces) -> tuple[float, ...]:
     along_m = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
     way_m = float(along_m[-1])
     if isinstance(gates, int):
-        most = max(math.floor(way_m / APART_M) - 1, 0)
+        most = max(math.floor(way_m / BETWEEN_GATES_M) - 1, 0)
         if gates > most:
             raise NoMission(
-                f"{v.name}: its way of {way_m:.0f} m has room for {most} gates {APART_M:g} m apart, not for {gates}",
+                f"{v.name}: its way of {way_m:.0f} m has room for {most} gates {BETWEEN_GATES_M:g} m apart, "
+                f"not for {gates}",
                 reason="time",
             )
-        return tuple((way_m - APART_M) * (k + 1) / gates for k in range(gates))
+        return tuple((way_m - BETWEEN_GATES_M) * (k + 1) / gates for k in range(gates))
     found = sorted(at for place in gates if (at := _passed_m(points, along_m, place)) is not None)
     kept: list[float] = []
     for at in found:
-        if at - (kept[-1] if kept else 0.0) >= APART_M and way_m - at >= APART_M:
+        if at - (kept[-1] if kept else 0.0) >= BETWEEN_GATES_M and way_m - at >= BETWEEN_GATES_M:
             kept.append(at)
     return tuple(kept)
 
@@ -135,7 +136,7 @@ def _passed_m(points: Floats, along_m: Floats, place: tuple[float, float]) -> fl
     part = np.clip(((np.array(place) - a) * way).sum(axis=1) / np.maximum((way**2).sum(axis=1), 1e-12), 0.0, 1.0)
     off_m = np.hypot(*(a + part[:, None] * way - place).T)
     leg = int(off_m.argmin())
-    return float(along_m[leg] + part[leg] * np.diff(along_m)[leg]) if off_m[leg] <= REACH_M else None
+    return float(along_m[leg] + part[leg] * np.diff(along_m)[leg]) if off_m[leg] <= BESIDE_WAY_M else None
 
 
 def gates_bought(v: VehiclePlan, slot: Slot, brief: Brief) -> VehiclePlan:

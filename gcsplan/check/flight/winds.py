@@ -20,13 +20,11 @@ from gcsplan.check.motion.stretch import Stretch
 from gcsplan.figures import floored
 from gcsplan.fleet.motion.ardupilot import leaning_m_s
 from gcsplan.vehicle import AIRSPEED_SPARE, Vehicle
-from gcsplan.wind.ability import ADVANCES_M_S, Ability, WindsAlong, circle_ratio
+from gcsplan.wind.ability import ADVANCES_M_S, Ability, WindsAlong, circle_ratio, winds_within
 from gcsplan.wind.declared import DeclaredWind, FlightWind
 from gcsplan.wind.drift import Drift
 from gcsplan.wind.window import TimeWindow, cover, slowest_m_s, window, witnessed
 from gcsplan.world.geodesy.atmosphere import true_per_indicated
-
-__all__ = ["Costs", "FlightInWind", "TooWindy", "WaysHome", "air_m_s", "gust_length_m"]
 
 UNEVEN_S = 0.1
 """Before each turn of an ArduPilot or a PX4, a flight may be later by this at a higher speed: the most of 66,000 random
@@ -53,8 +51,6 @@ _TRIED_STEPS = 12
 _LEAST_WAIT_S = 1e-3
 _TIMED_CELLS = 16
 _NO_RUN_M = 1e-6
-_RAYS = 64
-_RAY_RAD = 2.0 * math.pi / _RAYS
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,8 +106,8 @@ def gust_length_m(agl_m: float) -> float:
 class FlightInWind:
     """A flight's N stretches in the winds of a set; ``agl_m`` (N, 2): lowest and highest height above ground of each.
 
-    ``agl_of``: the same (P, 2) of straight ways from ``start`` (P, 3) to ``end``; None: of a way, that of its stretch.
-    NaN where the ground is not known.
+    ``agl_of``: the same (P, 2) of straight ways from ``start`` (P, 3) to ``end``; None: each way has the heights of its
+    stretch. NaN where the ground is not known.
     """
 
     def __init__(
@@ -478,97 +474,13 @@ class FlightInWind:
         east = np.tile([1.0, 0.0], (count, 1))
         ability = Ability(east, np.zeros(count), least, most, np.full(count, math.inf))
         hours_s = np.tile([self._departs_s[0], math.inf], (count, 1))
-        return _probes(wind, ability, amsl_m, self._agl_m, hours_s)
+        return winds_within(wind, ability, amsl_m, self._agl_m, hours_s)
 
     def _along(self, wind: DeclaredWind, hours_s: Floats) -> WindsAlong:
         """The winds of a set along the parts, within hours (P, 2)."""
         parts = self._parts
         amsl_m = np.sort(np.column_stack([parts.start[:, 2], parts.end[:, 2]]), axis=1)
-        return _probes(wind, self._ability, amsl_m, self._piece_agl_m, hours_s)
-
-
-class WaysHome:
-    """What straight ways home take at most, in any wind of a set, between two altitudes ``amsl_m``.
-
-    ``agl_m``: no way is higher above ground.
-    The metres through the air and the seconds of a way are convex in the way over ground, with any wind. They are known
-    in some directions; between two of these they are no more than in proportion, which is convex too.
-    """
-
-    def __init__(
-        self, vehicle: Vehicle, wind: FlightWind, amsl_m: tuple[float, float], agl_m: float = math.inf
-    ) -> None:  # fmt: skip
-        self._vehicle, self._wind, self._amsl_m, self._agl_m = vehicle, wind, amsl_m, agl_m
-        self._costs: dict[float, tuple[list[float], list[float]]] = {}
-        self.wind_m_s = float(self._winds(1.0).strongest_m_s(cover(wind.declared)).max())
-        """The highest speed of the wind."""
-
-    def longer_m(self, speed_m_s: float, way_m: tuple[float, float], past_m: float) -> tuple[float, float]:
-        """The metres through the air of a way (east, north), and as many as take as long in still air, at a commanded
-        speed; with ``past_m`` more metres in any direction. Neither is less than the way."""
-        air, seconds = self._rays(speed_m_s)
-        long_m = math.hypot(*way_m)
-        at = math.atan2(way_m[1], way_m[0]) % (2.0 * math.pi) / _RAY_RAD
-        first = min(int(at), _RAYS - 1)
-        after, scale = (first + 1) % _RAYS, long_m / math.sin(_RAY_RAD)
-        a, b = scale * math.sin((first + 1 - at) * _RAY_RAD), scale * math.sin((at - first) * _RAY_RAD)
-        air_m, took_s = (
-            math.fsum(m * cost for m, cost in ((a, c[first]), (b, c[after]), (past_m, max(c))) if m > 0.0)
-            for c in (air, seconds)
-        )
-        return air_m, took_s * speed_m_s
-
-    def advances(self, speed_m_s: float) -> bool:
-        """Whether the vehicle advances in every direction, in every wind of the set with its gusts."""
-        declared = self._wind.declared
-        slow, _ = self._winds(speed_m_s).speeds_m_s(cover(declared), declared.gusts_add_m_s)
-        return bool((slow >= ADVANCES_M_S).all())
-
-    def worst(self, speed_m_s: float) -> tuple[float, float]:
-        """Metres through the air and seconds of a metre in the worst direction."""
-        air, seconds = self._rays(speed_m_s)
-        return max(air), max(seconds)
-
-    def _rays(self, speed_m_s: float) -> tuple[list[float], list[float]]:
-        """Metres through the air and seconds for a metre over ground in each direction."""
-        if speed_m_s not in self._costs:
-            found = self._winds(speed_m_s).costs(cover(self._wind.declared))
-            air, seconds = (np.where(cost > 0.0, cost, math.inf).max(axis=0) for cost in found)
-            rays = np.maximum(air, 1.0).tolist(), np.maximum(seconds, 1.0 / speed_m_s).tolist()
-            self._costs[speed_m_s] = rays
-        return self._costs[speed_m_s]
-
-    def _winds(self, speed_m_s: float) -> WindsAlong:
-        angle = _RAY_RAD * np.arange(_RAYS)
-        none, speed, one = np.zeros(_RAYS), np.full(_RAYS, speed_m_s), np.ones((_RAYS, 1))
-        least, most = air_m_s(self._vehicle, speed, none, np.full(_RAYS, self._amsl_m[0]))
-        bound = np.full(_RAYS, math.inf) if self._vehicle.keeps_airspeed else speed
-        ability = Ability(np.column_stack([np.cos(angle), np.sin(angle)]), none, least, most, bound)
-        departs_s = self._wind.departs_s[0]
-        return _probes(
-            self._wind.declared, ability, one * self._amsl_m, np.tile([0.0, self._agl_m], (_RAYS, 1)),
-            one * [departs_s, math.inf],
-        )  # fmt: skip
-
-
-def _probes(wind: DeclaredWind, ability: Ability, amsl_m: Floats, agl_m: Floats, hours_s: Floats) -> WindsAlong:
-    """The winds of a set, within heights and hours (P, 2): probes at the ends of these and at the set's own between."""
-    if len(wind.heights_m) == 1 and len(wind.times_s) == 1:
-        zero = np.zeros(len(amsl_m))
-        return WindsAlong(wind, ability, np.arange(len(amsl_m)), zero, zero, zero)
-    spans_m, rows = amsl_m if wind.heights == "amsl" else agl_m, []
-    for i, (span_m, span_s) in enumerate(zip(spans_m.tolist(), hours_s.tolist(), strict=True)):
-        heights, times = _between(span_m, wind.heights_m), _between(span_s, wind.times_s)
-        rows += [(i, h, t) for h in heights for t in times]
-    part, height, at = np.array(rows).reshape(-1, 3).T
-    return WindsAlong(wind, ability, part.astype(np.intp), height, height, at)
-
-
-def _between(span: Sequence[float], nodes: Floats) -> list[float]:
-    """The ends of a span, within ``nodes``, and the nodes inside."""
-    low, high = (min(max(x, float(nodes[0])), float(nodes[-1])) for x in span)
-    inside = nodes[(nodes > low) & (nodes < high)].tolist()
-    return [low, *inside, *([high] if high > low else [])]
+        return winds_within(wind, self._ability, amsl_m, self._piece_agl_m, hours_s)
 
 
 def _known(agl_m: Floats) -> Floats:

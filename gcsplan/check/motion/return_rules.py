@@ -20,7 +20,7 @@ to the return altitude. Not judged: RTL_ALT_TYPE 1 (terrain), RTL_CLIMB_MIN, fen
 missions with DO_LAND_START. `cone_differs` is judged in `returned` alone.
 
 `return_s` is what a base power (`gcsplan.vehicle.Energy`) needs to know of a return; a wind makes its way longer
-(`flight.winds.WaysHome`).
+(`flight.ways_home.WaysHome`).
 """
 
 from __future__ import annotations

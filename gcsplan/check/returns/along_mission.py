@@ -24,7 +24,7 @@ import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.check.battery import BatteryHome, LegBattery
-from gcsplan.check.flight.winds import WaysHome
+from gcsplan.check.flight.ways_home import WaysHome
 from gcsplan.check.motion.return_rules import RETURN_RULES, at_home_m, return_s, speed_home_m_s
 from gcsplan.check.motion.stopping import about_turn_m, detour_home_m
 from gcsplan.check.motion.stretch import Stretch

@@ -28,7 +28,7 @@ from gcsplan.arrays import Floats
 from gcsplan.check.battery import battery_home
 from gcsplan.check.flight.corners import round_corners
 from gcsplan.check.flight.follow import follow
-from gcsplan.check.flight.winds import WaysHome
+from gcsplan.check.flight.ways_home import WaysHome
 from gcsplan.check.judge import TERRAIN_ERROR_M
 from gcsplan.check.motion.commands import LAND_STARTS
 from gcsplan.check.motion.project import why_unknown, with_error_of_home
