@@ -24,6 +24,7 @@ from gcsplan.app.parallel.executor import Executor, Inline, executor
 from gcsplan.app.parallel.sites import Site, site_of
 from gcsplan.app.plan.model import Plan, VehiclePlan
 from gcsplan.app.upload.on_board import settings_of_plan
+from gcsplan.check.verdict import WHOLE_S
 from gcsplan.errors import UsageError
 from gcsplan.mavlink.mission.parameter_file import read_param_file
 from gcsplan.mavlink.mission.parameter_list import off, vehicle_on_board
@@ -81,7 +82,12 @@ def terms_of(planned: Plan) -> Terms:
         return Terms()
     order = planned.fleet.order if planned.fleet is not None and arrival.mode == "sequence" else ()
     pad_clear_s = math.inf if arrival.pad_clear_s is None else arrival.pad_clear_s
-    return Terms(order, arrival.separation_m, pad_clear_s, arrival.window_s)
+    intervals_s: tuple[float, ...] = ()
+    window_s = arrival.window_s
+    if planned.fleet is not None and order and planned.fleet.intervals:
+        intervals_s = tuple(interval.requested_s for interval in planned.fleet.intervals)
+        window_s += 0.0 if planned.fleet.start_utc is None else WHOLE_S
+    return Terms(order, arrival.separation_m, pad_clear_s, window_s, intervals_s)
 
 
 def weather_of(

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 
 WHOLE_S = 1.0
+"""Gates open at whole seconds of the day, so what they set may be off by this."""
 PAPER_MARK = " (paper's figures)"
 
 

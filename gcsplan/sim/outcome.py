@@ -121,12 +121,15 @@ class Terms:
 
     ``order``: names in the required order of arrival, empty if any order is allowed. ``separation_m`` None: the least
     distance is reported but not judged. ``pad_clear_s``: seconds for which a landed vehicle blocks its place.
-    ``window_s``: how much an interval between two arrivals in this order may differ from the planned one."""
+    ``window_s``: how much an interval between two arrivals in this order may differ from the planned one.
+    ``intervals_s``: the planned ones, between neighbours in this order; empty: as in the time table, which holds in
+    still air."""
 
     order: tuple[str, ...] = ()
     separation_m: float | None = None
     pad_clear_s: float = math.inf
     window_s: float = 0.0
+    intervals_s: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -478,8 +481,11 @@ class Tally:
 
     def _intervals(self, traces: Sequence[Trace]) -> None:
         """Compare the times between the arrivals in the planned order with the planned ones."""
-        late_s = {t.name: t.arrive_s - (p.arrive_s or 0.0) for p, t in zip(self.parts, traces, strict=True)}
-        off_s = [late_s[after] - late_s[before] for before, after in pairwise(self.terms.order)]
+        came_s = {t.name: t.arrive_s for t in traces}
+        table_s = {p.vehicle.name: p.arrive_s or 0.0 for p in self.parts}
+        pairs = list(pairwise(self.terms.order))
+        planned_s = self.terms.intervals_s or [table_s[after] - table_s[before] for before, after in pairs]
+        off_s = [came_s[after] - came_s[before] - s for (before, after), s in zip(pairs, planned_s, strict=True)]
         off_s = [off if math.isfinite(off) else math.inf for off in off_s]
         if off_s:
             worst_s = max(off_s, key=abs)

@@ -43,7 +43,7 @@ from gcsplan.app.plan.vehicle import over_one_terrain, rebuilt
 from gcsplan.arrays import Floats
 from gcsplan.check.flight.times import over_ground, pace_over_ground
 from gcsplan.check.motion.circles import PLANE_LOITER_RADIUS_M, circle_reach_m
-from gcsplan.check.verdict import LegFigures
+from gcsplan.check.verdict import WHOLE_S, LegFigures
 from gcsplan.errors import InputError, NoMission, heed_cancel
 from gcsplan.fleet.arrival import Craft, Crew, NoSchedule, Schedule, Slot, schedule
 from gcsplan.fleet.intervals import Interval, centred, intervals
@@ -357,7 +357,7 @@ def _intervals(
     arrivals = {v.name: v.verdict.arrival_drift for v in flown}
     found = intervals(requested, slots, arrivals)
     if any(drifts(v) for v in flown):  # gates open at whole seconds
-        require_intervals(found, arrival.mode, arrival.window_s + (0.0 if gate is None else 1.0), arrivals)
+        require_intervals(found, arrival.mode, arrival.window_s + (0.0 if gate is None else WHOLE_S), arrivals)
     return tuple(found)
 
 

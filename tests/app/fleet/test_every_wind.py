@@ -11,6 +11,7 @@ import pytest
 
 from gcsplan import Plan, plan
 from gcsplan.app.output.files import summary_of
+from gcsplan.app.rehearse import rehearse, weather_of
 from gcsplan.errors import NoMission
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import Mission
@@ -98,6 +99,18 @@ def test_wings_keep_order_intervals_and_distance_in_each_wind_of_a_set() -> None
     widest = max(one.width_s for one in done.fleet.intervals)  # type: ignore[union-attr]
     assert widest <= 1.0 + 0.75 * (max(spread) - min(spread))  # half of the spread, were it tight
     assert summary_of(done)["fleet"]["in_every_wind"] is True
+
+
+@pytest.mark.slow
+def test_a_rehearsal_judges_intervals_by_the_request_where_the_wind_moves_one_of_two_kinds() -> None:
+    wind = {"speed_m_s": 6, "from_deg": 225}
+    done = plan(fan("cw", wind, {"mode": "sequence", "interval_s": 60, "window_s": 1}))
+    assert done.fleet is not None
+    table_s = done.fleet.slots[1].arrive_s - done.fleet.slots[0].arrive_s
+    assert abs(abs(table_s) - 60.0) > 5.0  # the wing drifts, the copter does not
+    result = rehearse(done, weather=weather_of(done.source, None, None, 0.0, 0.0), runs=2)
+    assert result.intervals_kept_runs == result.runs
+    assert abs(result.interval_error_s or 0.0) < 1.5
 
 
 @pytest.mark.slow

@@ -8,6 +8,7 @@ import pytest
 
 from gcsplan.app.fleet.kept_paths import KeptPaths
 from gcsplan.app.fleet.pipeline import plan_again
+from gcsplan.app.parallel.sites import world_of
 from gcsplan.app.plan.model import PlanOptions
 from gcsplan.app.session import Planner
 from gcsplan.mission_file import load_mission
@@ -47,7 +48,7 @@ def test_another_objective_or_a_vehicle_left_out_before_is_searched_anew() -> No
 
     def plans(objective: str | None = None) -> list[str]:
         heard.clear()
-        plan_again(source, PlanOptions(objective=objective), kept, lambda name, _: heard.append(name))
+        plan_again(source, world_of(source), PlanOptions(objective=objective), kept, lambda name, _: heard.append(name))
         return sorted(set(heard) - {""})
 
     assert plans() == ["a", "b"]

@@ -49,7 +49,7 @@ def test_the_report_is_written_whole_even_when_the_run_is_interrupted(
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        ({"kinds": ["mian"]}, "main, energy, band, large, many, turn, everyday, ceiling, room, given 'mian'"),
+        ({"kinds": ["mian"]}, "main, energy, band, large, many, turn, everyday, ceiling, room, time, given 'mian'"),
         ({"runs": 0}, "runs and count must be 1 or more"),
         ({"count": 0}, "runs and count must be 1 or more"),
         ({"seconds": [0.0]}, "seconds more than 0"),

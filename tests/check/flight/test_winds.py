@@ -13,11 +13,11 @@ from hypothesis import strategies as st
 
 from gcsplan.arrays import Floats
 from gcsplan.check.battery import battery_home
+from gcsplan.check.flight.ways_home import WaysHome
 from gcsplan.check.flight.winds import (
     COUPLED,
     COUPLED_SMOOTH,
     UNEVEN_S,
-    WaysHome,
     air_m_s,
     gust_length_m,
 )
