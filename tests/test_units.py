@@ -187,6 +187,7 @@ def test_the_chart_of_separations_names_the_exact_least_distance(units: Units) -
 
 
 @pytest.mark.slow
+@pytest.mark.nightly_but("imperial")
 @pytest.mark.parametrize("units", [IMPERIAL, AVIATION], ids=["imperial", "aviation"])
 def test_every_number_of_the_report_is_the_same_in_every_system(units: Units) -> None:
     done, homes = planned()

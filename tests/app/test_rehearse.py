@@ -349,6 +349,7 @@ class TwoAtOnce(Inline):
 
 
 @pytest.mark.slow
+@pytest.mark.nightly_but("2")
 @pytest.mark.parametrize("runs", [2, 7])
 def test_whoever_flies_the_runs_the_result_is_the_same(planned: Plan, monkeypatch: Any, runs: int) -> None:
     """Strong noise, so that limits are broken in some runs and the order is lost in some."""

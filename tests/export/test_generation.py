@@ -91,6 +91,7 @@ def write_over(place: Path) -> crash.World:
 
 @posix
 @pytest.mark.slow
+@pytest.mark.nightly_but("content", "journal")
 @pytest.mark.parametrize("fence", ["content", "stage", "journal", "gone", "end"])
 def test_power_losses_find_every_fence_that_is_left_out(fence: str) -> None:
     with workshop() as place:

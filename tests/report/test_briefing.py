@@ -108,6 +108,7 @@ def test_its_map_refers_to_the_reports_own_and_repeats_no_picture() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.nightly_but("worst")
 @pytest.mark.skipif(PROGRAM is None, reason="no browser is installed")
 @pytest.mark.parametrize("worst", [False, True], ids=["plain", "worst"])
 def test_the_briefing_of_four_vehicles_is_two_pages_of_a4_and_of_letter(tmp_path: Path, worst: bool) -> None:
@@ -151,7 +152,7 @@ def test_the_second_page_has_way_points_parameters_and_failsafes() -> None:
     assert "on 2026-12-21: the sun does not rise." in briefing(replace(page, daylight=night))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.skipif(PROGRAM is None, reason="no browser is installed")
 def test_no_table_is_wider_than_the_printed_page(tmp_path: Path) -> None:
     assert PROGRAM is not None

@@ -47,7 +47,7 @@ def test_an_altitude_within_the_limits_that_makes_all_safe_is_the_one_proposal()
     assert proposals == []
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_return_path_goes_before_an_altitude_above_max_agl_which_says_so() -> None:
     done, proposals = tried({"max_agl_m": 90})
     assert [p.keys[0][0] for p in proposals[:2]] == ["return_route", "rtl_rel_home_m"]

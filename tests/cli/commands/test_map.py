@@ -6,6 +6,8 @@ import json
 import signal
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -27,9 +29,15 @@ def test_ctrl_c_ends_the_server_and_keeps_edits_and_address(tmp_path: Path) -> N
     (tmp_path / "m.yaml").write_text(FLAT)
     command = [sys.executable, "-m", "gcsplan", "map", "m.yaml", "--no-browser"]
 
-    def start() -> subprocess.Popen[str]:
+    @contextmanager
+    def start() -> Iterator[subprocess.Popen[str]]:
         pipe = subprocess.PIPE
-        return subprocess.Popen(command, cwd=tmp_path, stdout=pipe, stderr=pipe, text=True)
+        with subprocess.Popen(command, cwd=tmp_path, stdout=pipe, stderr=pipe, text=True) as process:
+            try:
+                yield process
+                process.wait(60)
+            finally:
+                process.kill()
 
     with start() as running:
         assert running.stdout is not None

@@ -142,7 +142,7 @@ def test_what_is_reported_to_help_does(name: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.nightly_but("jacksboro.yaml-max_amsl_m-600.5", "jacksboro-wing.yaml-max_amsl_m-500.5")
+@pytest.mark.nightly_but("jacksboro.yaml-max_amsl_m-600.5")
 @pytest.mark.parametrize(
     ("file", "key", "given"),
     [
