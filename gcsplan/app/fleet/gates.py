@@ -20,13 +20,13 @@ from gcsplan.app.plan.left_out import LeavingOut
 from gcsplan.app.plan.model import Brief, VehiclePlan
 from gcsplan.app.plan.problem import built
 from gcsplan.app.plan.vehicle import rebuilt
-from gcsplan.arrays import Floats
 from gcsplan.errors import InputError, NoMission
 from gcsplan.fleet.arrival import Slot
 from gcsplan.mavlink.build.order import Gates
 from gcsplan.mission_file.request import GatePlaces, MissionFile
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Vehicle
+from gcsplan.world.geometry.path import nearest_on, track_length_m
 
 __all__ = ["WHERE", "counts", "gated", "gates_bought", "no_time_of_day", "some_start", "waits_for_time"]
 
@@ -111,8 +111,7 @@ def _places_m(v: VehiclePlan, gates: int | GatePlaces) -> tuple[float, ...]:
     """Metres over ground from the begin of the path to each gate: a number of them at equal distances, the last just
     before the goal, for only what is flown behind it makes the arrival uncertain."""
     points = v.solution.path.points[:, :2]
-    along_m = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
-    way_m = float(along_m[-1])
+    way_m = track_length_m(points)
     if isinstance(gates, int):
         most = max(math.floor(way_m / BETWEEN_GATES_M) - 1, 0)
         if gates > most:
@@ -122,21 +121,12 @@ def _places_m(v: VehiclePlan, gates: int | GatePlaces) -> tuple[float, ...]:
                 reason="time",
             )
         return tuple((way_m - BETWEEN_GATES_M) * (k + 1) / gates for k in range(gates))
-    found = sorted(at for place in gates if (at := _passed_m(points, along_m, place)) is not None)
+    away_m, along_m = nearest_on(np.array(gates), points)
     kept: list[float] = []
-    for at in found:
+    for at in sorted(along_m[away_m <= BESIDE_WAY_M].tolist()):
         if at - (kept[-1] if kept else 0.0) >= BETWEEN_GATES_M and way_m - at >= BETWEEN_GATES_M:
             kept.append(at)
     return tuple(kept)
-
-
-def _passed_m(points: Floats, along_m: Floats, place: tuple[float, float]) -> float | None:
-    """Where a way (N, 2) is nearest to a place, metres along it; None if it does not pass it."""
-    a, way = points[:-1], np.diff(points, axis=0)
-    part = np.clip(((np.array(place) - a) * way).sum(axis=1) / np.maximum((way**2).sum(axis=1), 1e-12), 0.0, 1.0)
-    off_m = np.hypot(*(a + part[:, None] * way - place).T)
-    leg = int(off_m.argmin())
-    return float(along_m[leg] + part[leg] * np.diff(along_m)[leg]) if off_m[leg] <= BESIDE_WAY_M else None
 
 
 def gates_bought(v: VehiclePlan, slot: Slot, brief: Brief) -> VehiclePlan:

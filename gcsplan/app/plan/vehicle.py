@@ -187,29 +187,33 @@ def rebuilt(
     order = replace(v.order, speed_m_s=speed_m_s, hold_s=0 if gate_utc else round(hold_s), gate_utc=gate_utc)
     over = widest(brief, [v])
     if order.gates is not None:
-        order = _opening(replace(v, order=order), over, order.gates, depart_s, v.order.speed_m_s)
+        order, mission, verdict = _opening(replace(v, order=order), over, order.gates, depart_s, v.order.speed_m_s)
+    elif order != v.order:
+        mission, verdict = built(over, v.request, v.solution, order)
     if order == v.order:
         return v
-    mission, verdict = built(over, v.request, v.solution, order)
     if verdict.findings:
         raise unsafe(verdict, v.request.vehicle)
     return replace(v, mission=mission, verdict=verdict, speed_m_s=speed_m_s, order=order)
 
 
-def _opening(v: VehiclePlan, brief: Brief, gates: Gates, depart_s: float, timed_m_s: float | None) -> Order:
+def _opening(
+    v: VehiclePlan, brief: Brief, gates: Gates, depart_s: float, timed_m_s: float | None
+) -> tuple[Order, Mission, Verdict]:
     """The order of a plan with its gates open as soon as the vehicle is surely there, if it leaves ``depart_s`` after
-    the start; ``timed_m_s``: the speed of its verdict."""
+    the start, and its mission as judged; ``timed_m_s``: the speed of the plan's verdict."""
     leaves_s = gates.start_s + depart_s
     after_s = v.verdict.gates_after_s() if timed_m_s == v.order.speed_m_s else ()
     for _ in range(GATE_ROUNDS):
         if len(after_s) == len(gates.at_m):
             gates = replace(gates, opens_s=tuple(round(leaves_s + s) for s in after_s))
         order = replace(v.order, gates=replace(gates, leaves_s=leaves_s))
-        found_s = built(brief, v.request, v.solution, order)[1].gates_after_s()
+        mission, verdict = built(brief, v.request, v.solution, order)
+        found_s = verdict.gates_after_s()
         if found_s == after_s:
             break
         after_s = found_s
-    return order
+    return order, mission, verdict
 
 
 def widest(brief: Brief, plans: Sequence[VehiclePlan]) -> Brief:

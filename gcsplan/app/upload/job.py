@@ -13,6 +13,7 @@ from gcsplan.app.plan.model import Plan
 from gcsplan.arrays import Floats
 from gcsplan.check.returns.verdict import WayHome
 from gcsplan.check.verdict import Verdict
+from gcsplan.fleet.arrival import Slot
 from gcsplan.mavlink.build.fence import Fence
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
 from gcsplan.mavlink.protocol.machine import TransferProgress
@@ -199,3 +200,15 @@ class JobResult:
         latest = {"message": self.message} | in_json("warnings", self.warnings)
         more = latest | dict(self.details or {}) | latest
         return fixed | {key: value for key, value in more.items() if value and key not in fixed}
+
+
+def releases(plan: Plan, results: Sequence[JobResult]) -> list[tuple[Slot, tuple[float, float] | None, bool]]:
+    """When each vehicle of a fleet is started by hand, in order; none of one vehicle. Each slot with the window of its
+    arrival, and whether the vehicle has its mission, by the results of an upload."""
+    slots = () if plan.fleet is None or len(plan.fleet.slots) < 2 else plan.fleet.slots
+    ready = {d.vehicle for d in results if d.verified and not d.code}
+    verdicts = {v.name: v.verdict for v in plan.vehicles}
+    return [
+        (slot, verdicts[slot.name].arrive_window_s(slot), slot.name in ready)
+        for slot in sorted(slots, key=lambda slot: slot.depart_s)
+    ]

@@ -31,6 +31,7 @@ from itertools import pairwise
 from gcsplan.check.fixed_wing.ends import REACHED_M, circle_up, climb_out, glide, is_wing, turns_early
 from gcsplan.check.flight.arc_waypoint import fly_arc
 from gcsplan.check.flight.route import fly_all
+from gcsplan.check.flight.times import DAY_S
 from gcsplan.check.motion.circles import PLANE_LOITER_RADIUS_M, circle_reach_m, circle_widened
 from gcsplan.check.motion.commands import flown_otherwise, moves_nothing, why_lost
 from gcsplan.check.motion.flight_state import Aboard
@@ -47,7 +48,6 @@ from gcsplan.vehicle import Autopilot, Vehicle
 COPTER_CIRCLE_RADIUS_M = 10.0  # ArduCopter CIRCLE_RADIUS, default
 LEAST_CLIMB_M = {Autopilot.ARDUCOPTER: 1.0, Autopilot.PX4: 2.5}  # takeoff_start; MIS_TAKEOFF_ALT, default
 TAKE_OFF_ELSEWHERE_M = 30.0
-DAY_S = 86400.0
 SOME_S = 1.0
 """A wait until a time of day counts as this many seconds, until it is known how long the flight to it takes."""
 

@@ -25,7 +25,7 @@ from gcsplan.world.geodesy.frame import Frame
 from gcsplan.world.terrain.vehicle_terrain import VehicleTerrain
 from gcsplan.world.world import World
 
-__all__ = ["MODEL_PART", "MODEL_S", "FlightTimes", "Parts", "over_ground", "pace_over_ground", "spare_s"]
+__all__ = ["DAY_S", "MODEL_PART", "MODEL_S", "FlightTimes", "Parts", "over_ground", "pace_over_ground", "spare_s"]
 
 TERRAIN_STEP_M = 25.0
 """Longest piece, m, into which a leg that follows the ground is cut."""
@@ -39,6 +39,9 @@ WITHOUT_STOP_M = 1.0
 overlap end this near to each other."""
 
 SLANTS_M = 0.01
+
+DAY_S = 86400.0
+"""A vehicle that is late at a gate waits as long, but for its lateness."""
 
 MODEL_PART, MODEL_S = 0.005, 0.5
 """Two models of one motion differ by no more than this part of the time, or by no more than these seconds."""

@@ -296,16 +296,17 @@ def upload_table(results: Sequence[JobResult], title: str = "upload", units: Uni
 
 def release_table(plan: Plan, results: Sequence[JobResult], gate: GateTime | None = None) -> None:
     """Print when to start each vehicle of a fleet by hand: nothing is armed or started here."""
-    if plan.fleet is None or len(plan.fleet.slots) < 2:
+    from gcsplan.app.upload.job import releases  # after an upload alone: what sends takes long to import
+
+    rows = releases(plan, results)
+    if not rows:
         return
-    ready = {d.vehicle for d in results if d.verified and not d.code}
-    windows = {v.name: v.verdict.arrive_window_s(plan.fleet.slot(v.name)) for v in plan.vehicles}
-    windy = [(WITHIN, True)] if any(windows.values()) else []
+    windy = [(WITHIN, True)] if any(within for _, within, _ in rows) else []
     columns = [("vehicle", False), ("release, T+", True), ("at the goal, T+", True), *windy, ("", False)]
     table = new_table("[bold]release[/]  by hand: nothing is armed or started from here", columns)
-    for slot in sorted(plan.fleet.slots, key=lambda s: s.depart_s):
-        state = "" if slot.name in ready else "[bold red]not ready[/]"
-        window = [span(windows[slot.name], 1)] if windy else []
+    for slot, within, ready in rows:
+        state = "" if ready else "[bold red]not ready[/]"
+        window = [span(within, 1)] if windy else []
         table.add_row(escape(slot.name), duration(slot.depart_s, 1), duration(slot.arrive_s, 1), *window, state)
     print_table(table)
     if gate is not None:

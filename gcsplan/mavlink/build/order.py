@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from gcsplan.arrays import Bools, Floats
 from gcsplan.mavlink.mission.mission import AltitudeFrame
 from gcsplan.vehicle import MissionEnd
+from gcsplan.world.geometry.path import distances_m
 from gcsplan.world.world import World
 
 PathPoint = tuple[float, float, float]
@@ -129,13 +130,13 @@ def with_gates(points: Floats, at_m: tuple[float, ...]) -> tuple[Floats, list[in
     A gate within `GATE_APART_M` of an inner way point is at that one.
     """
     for metres in at_m:
-        along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points[:, :2], axis=0).T))])
+        along = distances_m(points)
         if len(points) > 2 and np.abs(along[1:-1] - metres).min() < GATE_APART_M:
             continue
         k = int(np.clip(np.searchsorted(along, metres), 1, len(points) - 1))
         part = (metres - along[k - 1]) / (along[k] - along[k - 1])
         points = np.insert(points, k, points[k - 1] + part * (points[k] - points[k - 1]), axis=0)
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points[:, :2], axis=0).T))])
+    along = distances_m(points)
     return points, [1 + int(np.abs(along[1:-1] - metres).argmin()) for metres in at_m]
 
 

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from gcsplan.app.plan.model import Plan
+from gcsplan.app.upload.job import JobResult, releases
 from gcsplan.fleet.separation import Encounter, Separation
 from gcsplan.report.views.fleet import separation_text
 from gcsplan.units import Units
-
-if TYPE_CHECKING:
-    from gcsplan.app.upload.job import JobResult
 
 SECONDS, METRES, DEGREES = 2, 2, 7
 """Decimals of times, distances and places."""
@@ -52,17 +50,17 @@ def release_table(plan: Plan, results: Sequence[JobResult]) -> dict[str, Any] | 
     """When each vehicle of a fleet is started by hand, in order, and the common start in UTC; None for one vehicle.
 
     After an upload ``ready`` says whether a vehicle has its mission, else it is None."""
-    fleet = plan.fleet
-    if fleet is None or len(fleet.slots) < 2:
-        return None
-    ready = {d.vehicle for d in results if d.verified and not d.code}
-    windows = {v.name: v.verdict.arrive_window_s(fleet.slot(v.name)) for v in plan.vehicles}
     rows = [
-        {"name": slot.name, "release_s": slot.depart_s, "arrive_s": slot.arrive_s, "window_s": windows[slot.name],
-         "ready": slot.name in ready if results else None}
-        for slot in sorted(fleet.slots, key=lambda slot: slot.depart_s)
+        {"name": slot.name, "release_s": slot.depart_s, "arrive_s": slot.arrive_s, "window_s": within,
+         "ready": ready if results else None}
+        for slot, within, ready in releases(plan, results)
     ]  # fmt: skip
-    return {"rows": rows, "start_utc": None if fleet.start_utc is None else f"{fleet.start_utc:%Y-%m-%d %H:%M:%S}"}
+    if plan.fleet is None or not rows:
+        return None
+    return {
+        "rows": rows,
+        "start_utc": None if plan.fleet.start_utc is None else f"{plan.fleet.start_utc:%Y-%m-%d %H:%M:%S}",
+    }
 
 
 def _nearest(apart: Separation | None, name: str) -> dict[str, Any] | None:

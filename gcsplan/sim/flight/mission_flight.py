@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Indices
+from gcsplan.check.flight.times import DAY_S
 from gcsplan.sim.flight.kinematics import AT_ONCE_M_S2
 from gcsplan.sim.flight.trace import Trace
 from gcsplan.sim.flight.track import PASSED, CommandedTrack
@@ -27,7 +28,6 @@ SAMPLE_S = FLIGHT_STEP_S * SAMPLE_STEPS
 """Seconds between recorded samples of the flight."""
 CRAWL_M_S = 0.05
 """Lowest speed in a corner, m/s: a vehicle comes to rest only at a stop."""
-DAY_S = 86400.0
 HEADWAY_M_S = 0.3
 """Lowest speed over ground, m/s, against a wind that is too strong for the vehicle."""
 PATIENCE = 4.0

@@ -8,6 +8,9 @@ import numpy as np
 
 from gcsplan.arrays import Floats
 
+PLACES_AT_ONCE = 512
+"""Places whose distance from a track is computed in one batch."""
+
 
 @dataclass(frozen=True, eq=False)
 class Path:
@@ -61,3 +64,18 @@ def distances_m(points: Floats) -> Floats:
 def track_length_m(points: Floats) -> float:
     """Horizontal metres of a track or path (N, 2 or 3)."""
     return float(runs_m(points).sum())
+
+
+def nearest_on(places: Floats, track: Floats) -> tuple[Floats, Floats]:
+    """(N,) distances of places (N, 2) from a track (M, 2), and metres along it (N,) of the points nearest to them."""
+    a, d, s = track[:-1], np.diff(track, axis=0), distances_m(track)
+    away, where = np.empty(len(places)), np.empty(len(places))
+    for first in range(0, len(places), PLACES_AT_ONCE):
+        part = slice(first, first + PLACES_AT_ONCE)
+        t = ((places[part, None] - a) * d).sum(axis=-1) / np.maximum((d * d).sum(axis=-1), 1e-12)
+        t = t.clip(0.0, 1.0)
+        off = np.hypot(*(places[part, None] - a - t[..., None] * d).transpose(2, 0, 1))
+        k = off.argmin(axis=1)
+        rows = np.arange(len(k))
+        away[part], where[part] = off[rows, k], s[k] + t[rows, k] * (s[k + 1] - s[k])
+    return away, where

@@ -15,7 +15,7 @@ from gcsplan.app.rehearse import rehearse, weather_of
 from gcsplan.errors import NoMission
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import Mission
-from tests.oracles.fleet_wind import Flyer, flown, least_m
+from tests.oracles.fleet_wind import Flyer, Track, flown, least_m
 from tests.oracles.wind import Share, Winds, leaning_air_m_s
 
 SEPARATION_M = 40.0
@@ -67,6 +67,16 @@ def opens_s(done: Plan, mission: Mission) -> list[float]:
             at = start.replace(hour=hour, minute=minute, second=second)
             found.append((at - start).total_seconds() % 86400.0)
     return found
+
+
+def drawn_tracks(done: Plan, winds: Winds, rng: random.Random, *, varying: bool) -> dict[str, Track]:
+    """The fleet as it flies in a wind of the set, the same for all, or in any at each place and time."""
+    share = rng.random(), rng.choice([0.0, rng.random(), 1.0])
+    tracks = {}
+    for one in flyers(done):
+        each = [(rng.random(), rng.random()) for _ in one.times_s] if varying else [share] * len(one.times_s)
+        tracks[one.name] = flown(one, winds, each.__getitem__)
+    return tracks
 
 
 def assert_held(done: Plan, winds: Winds, shares: list[Share], window_s: float, interval_s: float) -> list[float]:
@@ -158,11 +168,7 @@ def test_no_wind_that_is_drawn_breaks_a_time_table_that_holds_in_all(seed: int) 
     assert done.fleet.in_every_wind is True
     bounds = {(one.first, one.second): one for one in done.fleet.intervals}
     for _ in range(12):
-        share = rng.random(), rng.choice([0.0, rng.random(), 1.0])
-        tracks = {}
-        for one in flyers(done):
-            each = [(rng.random(), rng.random()) for _ in one.times_s] if varying else [share] * len(one.times_s)
-            tracks[one.name] = flown(one, winds, each.__getitem__)
+        tracks = drawn_tracks(done, winds, rng, varying=varying)
         for (a, b), found in bounds.items():
             apart_s = tracks[b].arrive_s - tracks[a].arrive_s
             assert found.least_s - WITHIN_S <= apart_s <= found.most_s + WITHIN_S

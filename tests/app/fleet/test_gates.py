@@ -15,8 +15,16 @@ from gcsplan.app.rehearse import rehearse, weather_of
 from gcsplan.check.judge import judge
 from gcsplan.errors import InputError, NoMission
 from gcsplan.mavlink.mission import commands as cmd
-from tests.app.fleet.test_every_wind import SEPARATION_M, WITHIN_M, WITHIN_S, assert_held, fan, flyers, some_shares
-from tests.oracles.fleet_wind import flown, least_m
+from tests.app.fleet.test_every_wind import (
+    SEPARATION_M,
+    WITHIN_M,
+    WITHIN_S,
+    assert_held,
+    drawn_tracks,
+    fan,
+    some_shares,
+)
+from tests.oracles.fleet_wind import least_m
 from tests.oracles.wind import Winds
 
 START = datetime(2026, 3, 1, 23, 59, 0, tzinfo=UTC)
@@ -165,11 +173,7 @@ def test_no_wind_that_is_drawn_breaks_a_fleet_with_gates(seed: int) -> None:
     assert done.fleet is not None
     winds = Winds([[(low, high)]], [[(from_deg, from_deg + turn_deg)]])
     for _ in range(12):
-        share = rng.random(), rng.choice([0.0, rng.random(), 1.0])
-        tracks = {}
-        for one in flyers(done):
-            each = [(rng.random(), rng.random()) for _ in one.times_s] if varying else [share] * len(one.times_s)
-            tracks[one.name] = flown(one, winds, each.__getitem__)
+        tracks = drawn_tracks(done, winds, rng, varying=varying)
         for found in done.fleet.intervals:
             apart_s = tracks[found.second].arrive_s - tracks[found.first].arrive_s
             assert found.least_s - WITHIN_S <= apart_s <= found.most_s + WITHIN_S

@@ -6,8 +6,10 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from gcsplan.world.geometry.path import Path, distances_m, runs_m, track_length_m
+from gcsplan.world.geometry.path import Path, distances_m, nearest_on, runs_m, track_length_m
 
 POINTS = np.array([[0.0, 0.0, 10.0], [3.0, 4.0, 10.0], [3.0, 4.0, 22.0], [8.0, 16.0, 8.0]])
 
@@ -45,3 +47,19 @@ def test_its_points_are_its_own_and_do_not_change() -> None:
 def test_what_is_no_path_is_refused(points: np.ndarray) -> None:
     with pytest.raises(ValueError, match=r"\(N, 3\) finite metres"):
         Path(points)
+
+
+places = st.lists(st.tuples(st.floats(-50.0, 50.0), st.floats(-50.0, 50.0)), min_size=2, max_size=6, unique=True)
+
+
+@given(places, places)
+def test_the_nearest_place_of_a_track_is_as_near_as_any(some: list[tuple[float, float]], track: object) -> None:
+    line = np.array(track, dtype=float)
+    away, where = nearest_on(np.array(some), line)
+    s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+    t = np.linspace(0.0, s[-1], 2001)
+    dense = np.stack([np.interp(t, s, line[:, k]) for k in range(2)], axis=-1)
+    for place, far, at in zip(some, away, where, strict=True):
+        assert far <= np.hypot(*(dense - place).T).min() + 1e-6
+        there = [np.interp(at, s, line[:, k]) for k in range(2)]
+        assert math.dist(there, place) == pytest.approx(far, abs=1e-6)

@@ -29,7 +29,7 @@ from gcsplan.planners.optimal.searches.fine_tracks import FineTracks, narrow_pas
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.track import denser
 from gcsplan.planners.profile.zone_levels import free_below
-from gcsplan.world.geometry.path import Path, distances_m
+from gcsplan.world.geometry.path import Path, distances_m, nearest_on
 
 Point = tuple[float, float, float]
 
@@ -61,8 +61,6 @@ SHORTER = 0.7
 """Most of a leg's straight track for a piece to be searched on finer cells."""
 MOST_STRETCHES = 24
 """Most stretches of a track; a track with more is not tried."""
-PLACES_AT_ONCE = 512
-"""Places whose distance from a track is computed in one batch."""
 
 
 DENSE_M, BEFORE_M, MOST_PLACES = 0.5, 15.0, 600
@@ -329,21 +327,6 @@ class _Slit(_PieceSearch):
 
     def run(self) -> None:
         narrow_passage(self.work.plane)
-
-
-def nearest_on(places: Floats, track: Floats) -> tuple[Floats, Floats]:
-    """(N,) distances of places from a track, and metres along the track (N,) of the points nearest to them."""
-    a, d, s = track[:-1], np.diff(track, axis=0), distances_m(track)
-    away, where = np.empty(len(places)), np.empty(len(places))
-    for first in range(0, len(places), PLACES_AT_ONCE):
-        part = slice(first, first + PLACES_AT_ONCE)
-        t = ((places[part, None] - a) * d).sum(axis=-1) / np.maximum((d * d).sum(axis=-1), 1e-12)
-        t = t.clip(0.0, 1.0)
-        off = np.hypot(*(places[part, None] - a - t[..., None] * d).transpose(2, 0, 1))
-        k = off.argmin(axis=1)
-        rows = np.arange(len(k))
-        away[part], where[part] = off[rows, k], s[k] + t[rows, k] * (s[k + 1] - s[k])
-    return away, where
 
 
 def _runs(some: Bools) -> list[tuple[int, int]]:

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from gcsplan.arrays import Floats
 from gcsplan.bench.terrain.problems import problems
@@ -93,22 +90,6 @@ def test_the_planner_asks_for_it() -> None:
     improve(work)
     assert work.incumbent.cost < STRAIGHT_M
     assert work.incumbent.gap < 0.003
-
-
-places = st.lists(st.tuples(st.floats(-50.0, 50.0), st.floats(-50.0, 50.0)), min_size=2, max_size=6, unique=True)
-
-
-@given(places, places)
-def test_the_nearest_place_of_a_track_is_as_near_as_any(some: list[tuple[float, float]], track: object) -> None:
-    line = np.array(track, dtype=float)
-    away, where = bound_corridor.nearest_on(np.array(some), line)
-    s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
-    t = np.linspace(0.0, s[-1], 2001)
-    dense = np.stack([np.interp(t, s, line[:, k]) for k in range(2)], axis=-1)
-    for place, far, at in zip(some, away, where, strict=True):
-        assert far <= np.hypot(*(dense - place).T).min() + 1e-6
-        there = [np.interp(at, s, line[:, k]) for k in range(2)]
-        assert math.dist(there, place) == pytest.approx(far, abs=1e-6)
 
 
 @pytest.mark.parametrize("across", [False, True])
