@@ -74,6 +74,7 @@ def second_opinion(name: str, mission: Mission, **how: Any) -> flown.Opinion:
     return flown.judge(home, rows, rules, ground(), str(mission.autopilot), step_m=STEP_M, **how)
 
 
+@pytest.mark.nightly_but("copter_and_back")
 @pytest.mark.parametrize("name", MISSIONS)
 def test_a_planned_mission_is_safe_in_the_eyes_of_the_second_opinion(name: str) -> None:
     (v,) = planned(name).vehicles
@@ -83,6 +84,7 @@ def test_a_planned_mission_is_safe_in_the_eyes_of_the_second_opinion(name: str) 
     assert {"min_agl", "climb", "coverage"} <= opinion.depth.keys()
 
 
+@pytest.mark.nightly_but("copter", "plane")
 @pytest.mark.parametrize("name", ["copter", "px4_least_energy", "plane"])
 def test_both_files_hold_the_same_mission_as_stored(name: str) -> None:
     done = planned(name)

@@ -158,6 +158,7 @@ def run(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], tmp_
     return call
 
 
+@pytest.mark.nightly_but("arrival: {mode: sequence, interval_s: 5}")
 @pytest.mark.slow
 @pytest.mark.parametrize("arrival", ["", "arrival: {mode: none}", "arrival: {mode: sequence, interval_s: 5}"])
 def test_no_unit_is_told_twice_and_the_separation_is_one_number(run: Any, tmp_path: Path, arrival: str) -> None:

@@ -187,7 +187,7 @@ def files() -> tuple[Path, ...]:
     return tuple(path for group in each for path in group)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_sentences_are_plain() -> None:
     assert [one for path in files() for one in findings(path)] == []
 

@@ -81,7 +81,7 @@ def test_a_px4_that_would_not_fly_the_speed_gets_no_mission(monkeypatch: pytest.
             assert any("MPC_XY_CRUISE is 3 on board" in str(line) for line in result.warnings)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_simulated_px4_arrives_when_the_plan_says() -> None:
     zigzag = [[46.5 + 0.0012 * n, 8.0 + 0.0006 * (n % 2)] for n in range(1, 8)]
     for speed in (5, 10):

@@ -134,7 +134,7 @@ def test_results_go_to_standard_output_and_all_else_to_standard_error(run: Any, 
             assert all(line.startswith(asides) for line in err.splitlines()), (arguments, err)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_what_is_piped_is_the_table_and_a_reader_that_goes_away_is_no_bug(run: Any, tmp_path: Path) -> None:
     command = [sys.executable, "-m", "gcsplan", "plan", str(CROSSING), "-o", str(tmp_path / "out")]
     log = tmp_path / "log.txt"

@@ -16,7 +16,7 @@ def test_items_are_counted(run: Any) -> None:
     assert "a mission of more than 10000 items is not read" in err
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_ten_thousand_items_are_judged(run: Any) -> None:
     code, out, _ = run(*sizes.write("items", 10_000))
     assert code in (0, 4), json.loads(out)

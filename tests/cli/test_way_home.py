@@ -75,6 +75,7 @@ def planned(run: Any, tmp_path: Path) -> Path:
     return tmp_path / "first" / "uav1.plan"
 
 
+@pytest.mark.nightly_but("check", "upload")
 @pytest.mark.slow
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_return_that_is_reported_is_a_warning_with_one_headline_in_every_command(
@@ -88,6 +89,7 @@ def test_a_return_that_is_reported_is_a_warning_with_one_headline_in_every_comma
     assert "UNSAFE" not in text
 
 
+@pytest.mark.nightly_but("check-option", "plan-file")
 @pytest.mark.first_quick
 @pytest.mark.parametrize("how", ["file", "option"])
 @pytest.mark.parametrize("command", COMMANDS)
@@ -116,7 +118,7 @@ def test_a_batch_writes_no_mission_without_the_safe_return_that_its_file_require
     assert told["vehicles"][0]["way_home"]["safe"] is True
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_who_has_no_safe_return_is_left_out_where_vehicles_may_be(run: Any, tmp_path: Path) -> None:
     beside = UAV1 | {
         "name": "uav2", "sysid": 2, "start": {"east_m": 0, "north_m": 400}, "goal": {"east_m": 2000, "north_m": 400},

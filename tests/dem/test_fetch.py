@@ -284,7 +284,7 @@ def _fetch_in_a_process(url: str, folder: Path) -> None:
     Fetch(Cache(GLO30, folder), mirror=url, patience=QUICK).run(FOUR)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_processes_at_once_do_not_harm_each_other(served: Served, tmp_path: Path) -> None:
     context = multiprocessing.get_context("spawn")
     workers = [context.Process(target=_fetch_in_a_process, args=(served.url, tmp_path)) for _ in range(3)]

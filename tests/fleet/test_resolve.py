@@ -75,7 +75,7 @@ def verify(found: Resolved, crews: Sequence[Crew], rules: Rules = RULES) -> None
 # -- shifts -------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_shift_is_forbidden_exactly_where_the_shifted_motion_is_judged_a_conflict() -> None:
     free = looked = 0
     for seed in range(100):

@@ -20,7 +20,7 @@ def test_a_ground_stations_log(tmp_path: Path, status: bool) -> None:
     assert bool(log.notes) is status
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_ground_stations_log_of_two_vehicles_or_without_a_battery(tmp_path: Path) -> None:
     two = tlog(tmp_path / "two.tlog", sysids=(1, 7))
     with pytest.raises(InputError, match=r"systems 1, 7.*--sysid"):

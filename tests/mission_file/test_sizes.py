@@ -82,7 +82,7 @@ def test_where_half_a_metre_does_not_help_the_message_says_what_would(within_s: 
     )
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_corridor_of_4_000_random_points_is_placed_in_seconds(within_s: list[float]) -> None:
     within_s.append(10.0)  # 36 s before
     sizes.write("corridor", 4000)

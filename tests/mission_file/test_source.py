@@ -15,7 +15,7 @@ from tests.mission_file.test_load import PLANNERS, base, problems
 from tests.support.paths import MISSIONS, REPOSITORY
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_sample_is_the_mission_file_of_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     for name in ("fleet-4", "papers/abo"):

@@ -83,7 +83,7 @@ def test_what_a_large_fleet_leaves_out_is_said_and_the_first_to_arrive_are_shown
     assert [i for i in range(9) if f"uav{i}" in columns] == [0, 1, 2, 3]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_what_is_broken_or_not_judged_is_on_the_page_that_is_signed() -> None:
     page = small_page(low_m=350.0)
     text = briefing(page)
@@ -133,7 +133,7 @@ def test_the_briefing_of_four_vehicles_is_two_pages_of_a4_and_of_letter(tmp_path
         assert made.complaints() == []
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_second_page_has_way_points_parameters_and_failsafes() -> None:
     page = fleet_of_four(worst=False)
     text = briefing(page)

@@ -90,6 +90,7 @@ def test_the_page_is_drawn_without_an_error_or_a_request(page: Browser, report: 
     assert page.evaluate("document.querySelectorAll('script').length") == 2
 
 
+@pytest.mark.nightly
 def test_the_view_in_space_is_really_drawn_and_can_be_turned(page: Browser, report: Path) -> None:
     page.visit(report)
     left, top, wide, tall = show(page, "#scene")
@@ -170,6 +171,7 @@ def test_the_pointer_tells_the_same_numbers_in_every_system(
     assert re.search(r"kJ · [\d.\u202f]+ Wh", metric["#profile-0 .plot"].replace("\u202fWh", " Wh"))
 
 
+@pytest.mark.nightly
 def test_the_map_and_a_profile_can_be_enlarged_and_shown_whole_again(page: Browser, report: Path) -> None:
     page.visit(report)
     for name in ("map", "profile-0"):
@@ -293,6 +295,7 @@ def test_a_tap_tells_numbers_and_the_page_can_still_be_scrolled_by_a_finger(page
     assert page.complaints() == []
 
 
+@pytest.mark.nightly
 def test_no_label_of_an_axis_makes_a_phones_page_wider_than_the_phone(page: Browser, tmp_path: Path) -> None:
     made = small_page()
     craft = made.subjects[0].vehicle
@@ -305,6 +308,7 @@ def test_no_label_of_an_axis_makes_a_phones_page_wider_than_the_phone(page: Brow
     assert page.evaluate("document.documentElement.scrollWidth") == 390
 
 
+@pytest.mark.nightly
 def test_without_scripts_the_map_the_profile_and_every_number_are_there(page: Browser, tmp_path: Path) -> None:
     file = tmp_path / "bare.html"
     text = render_page(small_page())

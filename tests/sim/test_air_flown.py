@@ -19,6 +19,7 @@ def flown(weather: Weather | None = None, energy: dict[str, float] = ENERGY, run
     return rehearse(planned(energy, speed_m_s=[3, 8]), weather=weather, runs=runs, seed=3)
 
 
+@pytest.mark.nightly_but("0.0-0.0")
 @pytest.mark.slow
 @pytest.mark.parametrize(("wind_m_s", "from_deg"), [(0.0, 0.0), (4.0, 40.0), (5.0, 220.0), (6.0, 130.0)])
 def test_the_battery_is_the_integral_over_the_air_flown(wind_m_s: float, from_deg: float) -> None:

@@ -36,7 +36,7 @@ def test_another_order_of_arrival_is_a_violation() -> None:
     assert error.exit_code == 4
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_two_that_meet_are_named_with_the_moment() -> None:
     parts = [a_part(1, (0, 0), (1000, 0)), a_part(2, (500, -500), (500, 500))]
     result = rehearse(parts, FLAT, Terms((), 30.0))

@@ -118,7 +118,7 @@ def test_every_run_has_its_own_weather_and_the_same_seed_the_same_figures() -> N
     assert other.vehicles[0].arrive_s != one.vehicles[0].arrive_s
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_noise_beyond_the_margin_is_counted_in_runs() -> None:
     parts = [a_part(1, (0, 0), (1500, 0), height_m=66.005)]
     result = rehearse(parts, FLAT, Terms(), weather=Weather(noise_m=3.0), runs=12, seed=2)
@@ -128,7 +128,7 @@ def test_noise_beyond_the_margin_is_counted_in_runs() -> None:
     assert result.vehicles[0].min_agl_m == pytest.approx(60.0 - breach.by, abs=0.1)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_wind_that_is_too_strong_leaves_a_vehicle_that_never_arrives() -> None:
     result = rehearse([a_part(1, (0, 0), (0, 1000), arrive_s=90.0)], FLAT, Terms(), weather=Weather(40.0, 0.0))
     assert kinds(result) == ["arrival"]

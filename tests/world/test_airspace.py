@@ -152,6 +152,7 @@ def test_on_a_slope_the_track_error_costs_its_rise(scale: float) -> None:
     assert kinds(airspace, leg([1000, 100, roof + 0.001], [1000, 1900, roof + 0.001], track=8.0), limits) == {"max_agl"}
 
 
+@pytest.mark.nightly_but("3", "13", "0")
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(20))
 def test_beside_a_line_over_bent_ground_what_is_nearer_than_the_reach_counts(seed: int) -> None:
@@ -396,7 +397,7 @@ def test_without_clearance_a_polygon_may_be_touched() -> None:
     assert kinds(airspace, leg([600, 600, 50], [600, 600, 50]), limits) == {"zone"}
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_thousands_of_zones_are_found_through_the_lattice_as_one_by_one() -> None:
     rng = np.random.default_rng(3)
     ground = jacksboro()

@@ -25,6 +25,7 @@ from tests.support.random_worlds import (
 )
 
 
+@pytest.mark.nightly_but("in_plane-1.0", "in_plane-0.0")
 @pytest.mark.slow
 @pytest.mark.parametrize("step", [0.0, 0.2, 1.0])
 @pytest.mark.parametrize("make", [in_plane, turned, in_degrees])
@@ -141,7 +142,7 @@ def test_nothing_demanded_still_means_not_within() -> None:
     assert met.begins.tolist() == [True, False]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_distances_of_hulls_are_those_of_their_points_mixed() -> None:
     rng = np.random.default_rng(2)
     mix = rng.dirichlet(np.full(5, 0.25), 4000)

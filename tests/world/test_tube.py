@@ -76,7 +76,7 @@ def hug(tube: Tube, stations: Floats, sign: float, past_zones: bool) -> Floats |
     return sign * z
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @settings(max_examples=draws(80))
 @given(seed=st.integers(0, 2**32 - 1), kind=st.integers(0, 3))
 def test_a_profile_inside_the_tube_and_outside_the_bands_passes_the_check(seed: int, kind: int) -> None:
@@ -134,7 +134,7 @@ def test_over_level_ground_the_tube_is_as_wide_as_the_limits_say() -> None:
     assert flat().tube([[0, 0], [2000, 0]], Limits(60.0)).ceiling_m.min() == math.inf
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_floor_over_mountains_is_within_decimetres_of_what_the_check_demands() -> None:
     """10 km of the sample, track error 3 m, clearance 30 m; measured difference 0.1 m (median) and 1.2 m (most)."""
     rng = np.random.default_rng(2)

@@ -64,6 +64,7 @@ def test_tubes_and_level_lines_are_those_of_taller_zones() -> None:
     np.testing.assert_allclose(one.bottom_m, two.bottom_m)
 
 
+@pytest.mark.nightly_but("optimal-agl")
 @pytest.mark.slow
 @pytest.mark.parametrize(("planner", "datum"), [("optimal", "amsl"), ("optimal", "agl")])
 def test_plans_are_those_past_taller_zones(planner: str, datum: str) -> None:

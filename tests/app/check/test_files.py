@@ -65,7 +65,7 @@ def amiss(written: dict[str, Case], batch: Batch) -> list[str]:
     return [words for file, case in written.items() if (words := compare_with(case, found[file]))]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_files_with_a_home_are_judged_as_planted(folder: Path, options: WorldOptions) -> None:
     written = corpus.write(folder, corpus.WITH_HOME)
     assert len(written) > 100
@@ -382,7 +382,7 @@ vehicles:
     assert "min_agl" in out
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_way_home_is_judged_where_that_is_asked_for(run: Any, folder: Path, world: list[str]) -> None:
     file = file_of(folder, "round")  # from the east the hill stands in the way home
     assert run(file, *world, "--rtl-altitude", "120", "-q")[0] == 0
@@ -427,6 +427,7 @@ def said_and_data(value: Any) -> Iterator[tuple[str, dict[str, Any]]]:
             yield from said_and_data(each)
 
 
+@pytest.mark.nightly_but("--json-lines")
 @pytest.mark.slow
 @pytest.mark.parametrize("form", ["--json", "--json-lines"])
 def test_each_sentence_of_json_has_its_code_and_data(run: Any, folder: Path, world: list[str], form: str) -> None:

@@ -89,6 +89,7 @@ def test_an_archive_is_judged_as_its_files_are_together(options: WorldOptions, f
     assert {t.code for t in told} == {0, 2, 4}
 
 
+@pytest.mark.nightly_but("lines")
 @pytest.mark.slow
 @pytest.mark.parametrize("form", ["lines", "row", "whole"])
 def test_results_do_not_depend_on_who_works_nor_on_what_is_kept(

@@ -36,7 +36,7 @@ def tried(limits: dict[str, Any] | None = None, **vehicle: Any) -> tuple[Plan, l
     return done, list(homes["uav1"].proposals)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_an_altitude_within_the_limits_that_makes_all_safe_is_the_one_proposal() -> None:
     _, [altitude] = tried()
     assert (altitude.leaves_m, altitude.above_max_agl) == (0.0, False)

@@ -111,7 +111,7 @@ def test_wings_keep_order_intervals_and_distance_in_each_wind_of_a_set() -> None
     assert summary_of(done)["fleet"]["in_every_wind"] is True
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_rehearsal_judges_intervals_by_the_request_where_one_of_two_drifts() -> None:
     wind = {"speed_m_s": 6, "from_deg": 225}
     done = plan(fan("cw", wind, {"mode": "sequence", "interval_s": 60, "window_s": 1}))

@@ -228,7 +228,7 @@ def test_a_route_is_what_the_mission_flies_in_metres() -> None:
     assert all(wire[k].command == cmd.WAYPOINT for k in route.items[1:-1])
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_in_the_terrain_frame_a_vehicle_is_where_the_ground_has_it() -> None:
     hill = {"peaks": [{"center": [0, 200], "height_m": 60, "decay_m": [120, 120]}]}
     limits = {"min_agl_m": 40, "max_climb_deg": 45}
@@ -266,7 +266,7 @@ def test_the_papers_sequence_and_together_arrive_by_their_ideal_arithmetic() -> 
         assert v["speed_m_s"] == pytest.approx(30.0 * v["length_m"] / longest_m, rel=1e-4)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_msfoa_plans_by_priority_with_those_before_in_view(monkeypatch: pytest.MonkeyPatch) -> None:
     from gcsplan.research.swarm import planner as swarm_planner
 

@@ -88,7 +88,7 @@ def test_a_return_that_meets_the_hills_is_no_mission_and_a_higher_one_is() -> No
     assert done.vehicles[0].verdict.energy_j > 1.5 * done.vehicles[0].verdict.path_energy_j
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_world_in_local_metres_is_planned_like_any_other() -> None:
     text = """
 version: 1

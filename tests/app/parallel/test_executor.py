@@ -190,7 +190,7 @@ def test_processes_give_the_same_results(workers: Executor) -> None:
     assert sorted(workers.each(square, 0, range(3))) == [(0, 0), (1, 1), (2, 4)]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_results_do_not_run_far_ahead_of_a_slow_piece(workers: Executor, monkeypatch: pytest.MonkeyPatch) -> None:
     assert isinstance(workers, Dask)
     monkeypatch.setattr(module, "LEAD", 2)
@@ -204,7 +204,7 @@ def test_results_do_not_run_far_ahead_of_a_slow_piece(workers: Executor, monkeyp
     assert max(early) < most
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_killed_worker_costs_its_own_pieces_only(workers: Executor, tmp_path: Path) -> None:
     assert sorted(workers.each(kills_once, str(tmp_path), range(20))) == [(k, k) for k in range(20)]
     assert (tmp_path / "killed").exists()
@@ -226,7 +226,7 @@ def test_a_piece_that_kills_every_worker_costs_no_other(workers: Executor) -> No
     assert sorted(found) == [(k, -3 if k == 3 else k) for k in range(8)]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_after_ctrl_c_what_is_begun_is_finished(workers: Executor, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "unraisablehook", sent_again([signal.SIGINT], sys.unraisablehook))
     found: list[tuple[int, int]] = []
@@ -279,7 +279,7 @@ def test_a_worker_of_another_version_is_refused() -> None:
         module.piece_done(square, "9.9", 1, 2)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_scheduler_without_workers_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     distributed = pytest.importorskip("distributed")
     monkeypatch.setattr(module, "ANSWER_S", 1.0)
@@ -291,7 +291,7 @@ def test_a_scheduler_without_workers_is_named(monkeypatch: pytest.MonkeyPatch) -
         pass
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_scheduler_is_found_by_its_file_or_its_object_and_its_end_is_told(tmp_path: Path) -> None:
     distributed = pytest.importorskip("distributed")
     file = tmp_path / "scheduler.json"

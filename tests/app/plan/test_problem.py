@@ -33,7 +33,7 @@ def test_a_take_off_below_the_limits_is_bad_input_and_one_at_them_is_raised() ->
     assert raised.data["raised_m"] > 65.0  # type: ignore[operator]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_energy_objective_spends_no_more_than_the_shortest_way() -> None:
     sharp = yaml.safe_dump(CROSSING | {"planner": {"gap_percent": 0.1}})
     length, energy = (

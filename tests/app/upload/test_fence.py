@@ -207,7 +207,7 @@ def test_a_fence_that_enables_itself_is_told() -> None:
     )
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_rehearsal_tells_what_it_does_not_fly() -> None:
     done = planned(keys(end="rtl", rtl_rel_home_m=60))
     values = {"FENCE_ENABLE": 1.0, "FENCE_TYPE": 2.0, "FENCE_RADIUS": 300.0, "FS_THR_ENABLE": 3.0, "RTL_ALT_TYPE": 1.0}

@@ -15,6 +15,7 @@ from gcsplan.errors import InputError
 pytestmark = pytest.mark.slow
 
 
+@pytest.mark.nightly
 def test_the_check_of_one_leg_is_the_airspaces_own(main: list[NamedProblem]) -> None:
     p = main[48].problem
     names = ompl.KERNEL_ARGUMENTS

@@ -14,6 +14,7 @@ from gcsplan.world.geometry.zones import Circle
 pytestmark = pytest.mark.slow
 
 
+@pytest.mark.nightly
 def test_the_ceiling_stands_on_half_a_metre_and_blocks_the_straight_line(main: list[NamedProblem]) -> None:
     for p in main[:20]:
         ceiling = p.problem.limits.max_amsl_m

@@ -38,6 +38,7 @@ def test_main_is_twenty_pairs_spread_from_5_to_25_km_with_0_10_and_40_zones(main
     assert len({p.name for p in main}) == len({key_of(p.problem) for p in main}) == 60
 
 
+@pytest.mark.nightly
 def test_starts_and_goals_are_legal_and_as_low_as_can_be(main: list[NamedProblem]) -> None:
     for p in main:
         a, limits = p.problem.airspace, p.problem.limits
@@ -69,6 +70,7 @@ def test_a_seed_alone_makes_the_problems() -> None:
     assert other.problem.start != first.problem.start
 
 
+@pytest.mark.nightly
 def test_the_other_kinds_are_what_they_say(main: list[NamedProblem]) -> None:
     band = problems("band", seed=1, count=2)
     assert [p.problem.limits.max_climb_deg for p in band] == [10.0] * 2 + [15.0] * 2

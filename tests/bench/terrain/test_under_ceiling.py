@@ -21,7 +21,7 @@ def test_a_mission_is_the_same_from_its_seed_alone() -> None:
     assert key_of(problem) == key_of(again) != key_of(other)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_eight_missions_have_every_group_and_keep_the_stated_ranges() -> None:
     drawn = [mission(3, number) for number in FIRST]
     groups = {group for group, *_ in drawn}

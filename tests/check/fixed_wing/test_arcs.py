@@ -104,7 +104,7 @@ def path_of(turns: list[tuple[float, float, float]]) -> list[tuple[float, float,
 
 @settings(max_examples=draws(12))
 @given(corners)
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_judged_pieces_hold_the_flown_track_in_every_frame_of_altitude(
     turns: list[tuple[float, float, float]],
 ) -> None:

@@ -43,6 +43,7 @@ def turned(start: Place, end: Place, angle_deg: float) -> np.ndarray:
     return np.vstack([a, a + way])
 
 
+@pytest.mark.nightly_but("2--180.0", "2-200.0", "0-1.5")
 @pytest.mark.first_quick
 @pytest.mark.parametrize("angle_deg", [1.5, 30.0, 90.0, 180.0, 200.0, 300.0, 350.0, -45.0, -180.0, -270.0])
 @pytest.mark.parametrize("seed", seeds(1, 3, 3))

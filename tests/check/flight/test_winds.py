@@ -85,6 +85,7 @@ def test_a_constant_wind_gives_one_time_and_only_what_the_lean_allows() -> None:
     assert window_of(flown(blows((6, 6), (270, 270))))[1] == pytest.approx(still.arrive_s, abs=1e-6)
 
 
+@pytest.mark.nightly_but("arducopter")
 @pytest.mark.slow
 @pytest.mark.parametrize("autopilot", [Autopilot.ARDUCOPTER, Autopilot.PX4])
 def test_a_set_holds_every_wind_of_it_in_window_and_energy(autopilot: Autopilot) -> None:

@@ -140,7 +140,7 @@ def test_another_vehicle_does_not_inherit_figures() -> None:
     assert board.line().startswith("planning uav2 (2 of 2), ")
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_lines_go_to_standard_error_and_the_document_to_standard_output(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

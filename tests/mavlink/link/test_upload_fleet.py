@@ -61,7 +61,7 @@ def fleet(numbers: range, trouble: Mapping[int, Mapping[str, Any]], drop: float)
     assert server.mishandled == 0
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_twenty_vehicles_are_verified_over_a_link_that_loses_a_twentieth() -> None:
     sent = [mission(n) for n in FLEET]
     ended: list[str] = []
@@ -77,7 +77,7 @@ def test_twenty_vehicles_are_verified_over_a_link_that_loses_a_twentieth() -> No
     assert sorted(ended) == sorted(each.name for each in sent)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_three_failing_vehicles_are_named_and_the_other_seventeen_verified() -> None:
     trouble: dict[int, dict[str, Any]] = {
         4: {"silent_after": 0},

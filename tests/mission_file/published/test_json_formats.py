@@ -288,7 +288,7 @@ def spoilt(draw: Any, value: Any) -> Any:
     return draw(JUNK)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.draws
 def test_a_spoilt_file_gives_its_zones_or_words_of_what_is_wrong(tmp_path: Path) -> None:
     def attack(data: st.DataObject) -> str:

@@ -226,7 +226,7 @@ ANY_UNIT = st.sampled_from(["M", "FT"])
 ANY_REFERENCE = st.sampled_from(["AMSL", "AGL", "MSL", "SFC"])
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @settings(max_examples=draws(150), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data(), NUMBERS, ANY_UNIT, ANY_REFERENCE, st.sampled_from(["floor", "ceiling"]), st.booleans())
 def test_every_spelling_of_a_level_gives_the_same_zone(

@@ -225,7 +225,7 @@ def test_out_of_a_pit_under_max_agl_the_way_winds_up() -> None:
     assert faults(p, path) == []
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_pits_narrower_than_the_search_sees_are_left_and_entered_in_laps() -> None:
     def pits(east: Floats, north: Floats) -> Floats:
         away = np.minimum(np.hypot(east - 1000.0, north - 4000.0), np.hypot(east - 7000.0, north - 4000.0))

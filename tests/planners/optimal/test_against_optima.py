@@ -123,6 +123,7 @@ def test_pass_height_is_where_a_fine_flood_joins_the_ends(seed: int) -> None:
     assert not joined(found - spread)
 
 
+@pytest.mark.nightly
 def test_patient_search_comes_within_a_hair_of_known_optima() -> None:
     for seed in range(4):
         case = make("discs", seed)
@@ -214,6 +215,7 @@ def tunnel(seed: int, climb_deg: float, band: bool) -> tuple[Problem, Floats]:
     return problem, a + at[np.diff(at, prepend=-1.0) > 1e-6][:, None] * (b - a)
 
 
+@pytest.mark.nightly_but("2-True", "0-True", "2-False")
 @pytest.mark.parametrize("band", [False, True])
 @pytest.mark.parametrize("seed", seeds(4, 4, 8))
 def test_profile_in_a_tunnel_is_the_linear_programmes(seed: int, band: bool) -> None:
@@ -250,6 +252,7 @@ def test_profile_in_a_tunnel_is_the_linear_programmes(seed: int, band: bool) -> 
         assert cost <= cost_of(problem, points) * 1.002 + slack
 
 
+@pytest.mark.nightly
 def test_bound_holds_for_a_path_that_touches_its_limits() -> None:
     """A ceiling that equals the ground's pass: the only path touches the limits at one point."""
     z = np.full((21, 21), 50.0)
@@ -279,6 +282,7 @@ def test_bound_holds_for_a_path_that_touches_its_limits() -> None:
     assert solution.path.length_m <= 1.01 * cost_of(problem, best)
 
 
+@pytest.mark.nightly
 def test_bound_lets_height_be_won_on_the_way_out_of_a_pocket() -> None:
     """A ridge behind a wall, 200 m from the start in a straight line; only the 400 m track around the wall is long
     enough for the climb."""
@@ -297,6 +301,7 @@ def test_bound_lets_height_be_won_on_the_way_out_of_a_pocket() -> None:
     assert solution.path.length_m <= 1.001 * cost_of(problem, way)
 
 
+@pytest.mark.nightly_but("90", "91")
 @pytest.mark.parametrize("seed", [89, 90, 91])
 def test_bound_holds_along_the_edges_of_holes_in_a_turned_raster(seed: int) -> None:
     """In a rotated raster rounding leaves nothing exactly in line: a track along a wall lies slightly beside it."""

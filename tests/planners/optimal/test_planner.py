@@ -166,7 +166,7 @@ def test_band_over_the_ground_is_followed_up_and_down_a_hill() -> None:
     assert gentle.path.length_m > s.path.length_m
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_maximum_agl_over_level_ground_is_a_maximum_amsl() -> None:
     """Same bytes, and the searches of the plane apply: only a band over uneven ground is searched on a lattice."""
     level = ground(200.0)
@@ -236,7 +236,7 @@ def test_round_trip_over_a_via_and_a_via_on_the_start_are_flown() -> None:
     assert s.path.length_m < 1.01 * tangent_length(800.0, 100.0)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_energy_pays_the_detour_that_climbs_less_and_no_more() -> None:
     p = problem(ground(ridge), objective="energy", vertical_j_per_m=600.0)
     aside = np.linspace(0.0, 1000.0, 10_001)
@@ -245,7 +245,7 @@ def test_energy_pays_the_detour_that_climbs_less_and_no_more() -> None:
     assert best.min() - 1.0 <= p.cost(solve(p).path) <= best.min() * 1.001
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_climb_limit_is_kept_by_climbing_early_and_by_a_longer_way() -> None:
     def step(east: Floats, north: Floats) -> Floats:
         return np.where(east > 1000.0, 150.0, 0.0)

@@ -82,7 +82,7 @@ def test_a_way_that_leaves_the_first_window_is_found_and_judged_where_it_leads()
     assert done.source.level > 0
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_ceiling_that_shuts_the_whole_model_is_still_proved_to() -> None:
     with pytest.raises(NoMission) as caught:
         plan(source_of(ROW_4, max_amsl_m=600.5))
@@ -406,7 +406,7 @@ def test_campaign_of_worlds_longer(family: str, seed: int) -> None:
     assert outcome.wrong == [], str(outcome)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_campaign_finds_a_planner_that_takes_its_window_for_the_world() -> None:
     def blind(problem: Problem) -> Solution:
         surface = replace(problem.airspace.surface, goes_on=NO_SIDES)

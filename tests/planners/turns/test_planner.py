@@ -167,7 +167,7 @@ def _distance(x: Floats, a: Floats, b: Floats) -> float:
     return float(np.hypot(*(x - a - t * (b - a))))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_random_paths_that_touch_zones_at_corners_are_rounded_and_legal_as_flown(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

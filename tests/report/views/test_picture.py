@@ -19,7 +19,7 @@ from tests.support.pages import (
 )
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_each_figure_is_drawn_as_a_png_too() -> None:
     drawn = figures(page_of_plan(planned()))
     assert set(drawn) == {"report-map.png", "report-space.png", "report-profile.png"}
@@ -40,7 +40,7 @@ def test_no_label_of_the_map_lies_on_another() -> None:
         assert not a.padded(-1.0).overlaps(b.padded(-1.0)), (one, other)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_map_has_the_reports_colours_low_ground_is_no_lake() -> None:
     drawn = figures(page_of_plan(planned()))["report-map.png"]
     pixels = np.asarray(Image.open(io.BytesIO(drawn)).convert("RGB"), np.int16)
@@ -48,6 +48,7 @@ def test_the_map_has_the_reports_colours_low_ground_is_no_lake() -> None:
     assert float(np.mean((blue > green + 20) & (blue > red + 20))) < 0.001
 
 
+@pytest.mark.nightly_but("svg-<?xml")
 @pytest.mark.slow
 @pytest.mark.parametrize(("form", "begins"), [("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF")])
 def test_a_picture_of_each_form_has_the_same_bytes_again(form: str, begins: bytes) -> None:

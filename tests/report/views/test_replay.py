@@ -69,7 +69,7 @@ def test_thinned_places_are_no_farther_from_the_motion_than_is_said(
     assert error_m <= FINE_M or sum(map(len, kept)) >= most
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_hundred_vehicles_planned_and_flown_stay_within_the_pages_bound() -> None:
     page = page_with([wavy(k, 150, f"uav{k}") for k in range(100)])
     page = replace(page, subjects=tuple(replace(s, flown=s.motion) for s in page.subjects))

@@ -36,7 +36,7 @@ def test_the_sketch_has_map_and_table_and_nothing_that_a_policy_blocks() -> None
     assert JUDGED[True] in html
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_fleet_of_many_has_as_many_rows_as_vehicles() -> None:
     assert len(re.findall("<tr><th>uav", plan("sample:fleet-4")._repr_html_())) == 4
     assert callable(sketch_html)

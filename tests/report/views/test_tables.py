@@ -83,7 +83,7 @@ def table(read: Reader) -> list[str]:
     return read.text.split("Flown beside planned")[1].split("In space")[0].split()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_flown_figures_come_from_the_tracks_and_stand_beside_the_plans(
     folder: Path,
 ) -> None:
@@ -113,7 +113,7 @@ def test_flown_figures_come_from_the_tracks_and_stand_beside_the_plans(
     assert "fleet least separation" in words
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_replay_holds_the_plan_and_the_flight_each_from_its_own_source(folder: Path) -> None:
     made, result = planned(folder), flown(folder)
     tracks = Reader(render_rehearsal(made, result)).data["replay"]["tracks"]
@@ -129,7 +129,7 @@ def test_the_replay_holds_the_plan_and_the_flight_each_from_its_own_source(folde
         assert np.linalg.norm(drawn - own.points, axis=1).max() < 0.25
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_first_of_several_runs_is_shown_and_said(folder: Path) -> None:
     one, several = flown(folder, seed=4), flown(folder, seed=4, runs=3)
     assert [np.array_equal(a.points, b.points) for a, b in zip(one.flown, several.flown, strict=True)] == [True, True]
@@ -138,7 +138,7 @@ def test_the_first_of_several_runs_is_shown_and_said(folder: Path) -> None:
     assert "replay show the first run" in read.text
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_rehearsal_that_went_wrong_is_the_headline(folder: Path) -> None:
     made, result = planned(folder), flown(folder)
     terms = replace(result.terms, order=())
@@ -152,7 +152,7 @@ def test_a_rehearsal_that_went_wrong_is_the_headline(folder: Path) -> None:
         assert in_units(breach.message, METRIC) in read.text
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_rehearse_writes_the_page_even_where_it_finds_violations(run: Any, tmp_path: Path) -> None:
     file = write(tmp_path)
     assert run("rehearse", file, "--report", "page.pdf")[0] == 2

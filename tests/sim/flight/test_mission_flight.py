@@ -24,6 +24,7 @@ def delay(seconds: float) -> MissionItem:
     return MissionItem(cmd.DELAY, m.NO_POSITION, (seconds, -1.0, -1.0, -1.0))
 
 
+@pytest.mark.nightly_but("150.0-3.0")
 @pytest.mark.slow
 @pytest.mark.parametrize(("leg_m", "measured_m_s"), [(60.0, 7.0), (100.0, 4.0), (150.0, 3.0)])
 def test_a_lower_speed_on_the_move_takes_hold_as_slowly_as_on_a_real_arducopter(
@@ -94,7 +95,7 @@ def test_a_short_leg_is_flown_as_slowly_as_a_real_arducopter_flew_it(leg_m: floa
     assert speed_at(flown, 50 + 400) == pytest.approx(15.0, rel=0.01)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_waits_in_the_air_and_on_the_ground_last_as_long_as_they_say() -> None:
     plain = fly([track(TAKEOFF, at(cmd.WAYPOINT, 0, 200, 50), at(cmd.WAYPOINT, 0, 400, 50))], [0.0])
     waits = track(delay(12), TAKEOFF, delay(7.5), at(cmd.WAYPOINT, 0, 200, 50), at(cmd.WAYPOINT, 0, 400, 50))
@@ -137,7 +138,7 @@ def test_the_ideal_vehicle_of_the_papers_flies_length_over_speed() -> None:
     assert fly([way], [0.0]).arrive_s[0] == pytest.approx(length_m / 8, abs=0.1)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @settings(max_examples=8)
 @given(
     legs=st.lists(st.tuples(st.floats(-150, 150), st.floats(-150, 150), st.floats(20, 90)), min_size=1, max_size=6),

@@ -17,7 +17,7 @@ from gcsplan.wind.declared import DeclaredWind
 from tests.support.short_flights import CLIMB_S, COPTER, TAKEOFF, at, track
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_wind_within_the_airspeed_costs_no_time_and_beyond_it_costs_what_is_missing() -> None:
     way = track(TAKEOFF, at(cmd.WAYPOINT, 0, 1000, 50))
     calm = fly([way], [0.0]).arrive_s[0]
@@ -31,7 +31,7 @@ def test_wind_within_the_airspeed_costs_no_time_and_beyond_it_costs_what_is_miss
     assert across == pytest.approx(CLIMB_S + 1000 / v + v / 1.5, abs=0.1)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_wind_adds_to_what_keeps_its_airspeed() -> None:
     """A real ArduPlane in 5 m/s (SITL) took 632.1 s over 15 legs of the jacksboro wing where this took 631.3."""
     ideal = replace(COPTER, accel_m_s2=math.inf, corner_accel_m_s2=math.inf)
@@ -41,7 +41,7 @@ def test_wind_adds_to_what_keeps_its_airspeed() -> None:
         assert arrives == pytest.approx(CLIMB_S + 1000 / over_ground, abs=0.1)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_run_is_the_same_whether_it_is_flown_alone_or_among_others() -> None:
     ways = [track(TAKEOFF, at(cmd.WAYPOINT, 0, 600, 50)), track(TAKEOFF, at(cmd.WAYPOINT, 600, 0, 50))]
     weather = Weather(5.0, None, 2.0, 1.0)
@@ -52,7 +52,7 @@ def test_a_run_is_the_same_whether_it_is_flown_alone_or_among_others() -> None:
     assert other.arrive_s.tolist() != alone.arrive_s.tolist()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_noise_and_gusts_have_the_size_that_was_asked_for() -> None:
     way = track(TAKEOFF, at(cmd.WAYPOINT, 0, 1500, 50))
     noisy = fly([way], [0.0], weather=Weather(noise_m=2.0), runs=40, seed=3)
@@ -64,7 +64,7 @@ def test_noise_and_gusts_have_the_size_that_was_asked_for() -> None:
     assert gusty.offset_m[..., 2].std() == 0.0
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_one_that_cannot_make_way_never_arrives_and_the_flight_still_ends() -> None:
     way = track(TAKEOFF, at(cmd.WAYPOINT, 0, 600, 50))
     flown = fly([way], [0.0], weather=Weather(30.0, 0.0))

@@ -22,7 +22,7 @@ FRAME = Frame(46.5, 8.0)
 GEOD = Geod(ellps="WGS84")
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @settings(max_examples=draws(400))
 @given(st.integers(2, 40), st.floats(0.1, 5000.0), st.floats(1.0, 20_000.0), st.integers(0, 10**6), st.booleans())
 def test_a_corridor_in_metres_holds_its_buffer_and_little_more(

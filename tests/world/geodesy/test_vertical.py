@@ -49,6 +49,7 @@ def is_times(surface: Surface, heights: Any, metres: float) -> bool:
     )
 
 
+@pytest.mark.nightly_but("6130", "5798", "5621", "7837")
 @pytest.mark.slow
 @pytest.mark.parametrize("code", UPWARDS)
 def test_a_vertical_code_has_its_unit_wherever_it_stands(tmp_path: Path, code: int) -> None:

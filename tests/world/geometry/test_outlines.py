@@ -20,6 +20,7 @@ def ring_of(kind: str, count: int, seed: int) -> Floats:
     return np.array((smooth if kind == "smooth" else spiky)(count, random.Random(seed)))
 
 
+@pytest.mark.nightly_but("False-0.5-spiky", "True-0.5-spiky", "True-0.5-smooth")
 @pytest.mark.first_quick
 @pytest.mark.parametrize("kind", ["smooth", "spiky"])
 @pytest.mark.parametrize("tolerance_m", [0.5, 20.0])
@@ -77,7 +78,7 @@ def test_an_outline_that_would_take_minutes_is_refused_at_once() -> None:
     assert overlapping_pairs(ring_of("smooth", 99_000, 1)) < MOST_EDGE_PAIRS
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_corridor_of_a_tangled_line_holds_it_and_is_found_in_time() -> None:
     line = np.random.default_rng(1).uniform(0.0, 4000.0, (500, 2))
     begun = time.process_time()

@@ -42,7 +42,7 @@ RASTERS = [
 ]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @settings(max_examples=draws(14))
 @given(st.data())
 def test_the_fitted_grid_is_nowhere_farther_from_the_exact_one_than_it_says(data: st.DataObject) -> None:
@@ -65,7 +65,7 @@ def test_the_fitted_grid_is_nowhere_farther_from_the_exact_one_than_it_says(data
     assert fitted.error_m < limit_m
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @settings(max_examples=draws(12))
 @given(st.data())
 def test_the_way_back_from_the_grid_closes(data: st.DataObject) -> None:

@@ -110,6 +110,7 @@ def same_where_seen(part: LocalExtrema, whole: LocalExtrema, rows: NDArray[np.in
     return all(np.array_equal(a[at], b[at]) for a, b in zip(part[:3], whole[:3], strict=True))
 
 
+@pytest.mark.nightly_but("0.0")
 @pytest.mark.slow
 @pytest.mark.parametrize("reach_m", [0.0, 4.0, 70.0])
 def test_lines_find_all_that_they_meet_looked_at_and_little_else(
@@ -136,7 +137,7 @@ def test_lines_find_all_that_they_meet_looked_at_and_little_else(
     assert same_where_seen(copy.extrema, whole, cells[:, 1], cells[:, 0])
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_what_is_looked_at_in_part_judges_as_what_is_looked_at_as_a_whole(monkeypatch: pytest.MonkeyPatch) -> None:
     rng = np.random.default_rng(8)
     z = np.cumsum(np.cumsum(rng.normal(0.0, 0.4, (700, 800)), axis=0), axis=1)

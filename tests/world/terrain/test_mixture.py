@@ -29,6 +29,7 @@ def layer(cell: float, z: np.ndarray, **at: float) -> TerrainLayer:
     return TerrainLayer(window, cell_m(window), f"{cell:g} m")
 
 
+@pytest.mark.nightly_but("at a sea")
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES[0:1] + NAMES[3:4] + NAMES[5:6] + NAMES[7:8] + NAMES[9:])
 def test_no_ground_lies_outside_the_two_heights_of_layers(name: str, tmp_path: Path) -> None:

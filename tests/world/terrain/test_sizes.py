@@ -85,7 +85,7 @@ def held_mb(folder: Path, million: float, *more: str) -> tuple[int, float, str]:
     return ended.returncode, int(most) / 1024.0, "\n".join(said)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @PROC
 def test_too_many_cells_are_refused_before_they_are_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)

@@ -320,6 +320,7 @@ def test_an_ascii_grid_needs_its_coordinate_system(tmp_path: Path) -> None:
     assert np.abs(surface.ground_at(e, n) - wanted).max() < 1e-5
 
 
+@pytest.mark.nightly_but("one across--179.98", "one across-179.98", "two tiles--179.98", "two tiles-179.98")
 @pytest.mark.first_quick
 @pytest.mark.parametrize("lon_deg", [179.98, -179.98])
 @pytest.mark.parametrize("layout", ["two tiles", "one across", "global"])
@@ -1099,7 +1100,7 @@ def tile_of(folder: Path, col: int, row: int, *, written: bool) -> Path:
     return path
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_many_tiles_are_read_by_windows(tmp_path: Path) -> None:
     """36 tiles, 1.9 GB if they were read: the memory is that of the window, and the hash that of what was read."""
     for col in range(6):

@@ -62,6 +62,7 @@ def intervals_of(mesh: Mesh) -> tuple[Floats, Floats, Floats]:
     return intervals(mesh, every, *ranges(mesh, TOP_M, every), 1e-3)
 
 
+@pytest.mark.nightly_but("2-None-False")
 @pytest.mark.first_quick
 @pytest.mark.draws
 @pytest.mark.parametrize("turned", [False, True])

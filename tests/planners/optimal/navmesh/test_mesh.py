@@ -178,6 +178,7 @@ def world_of(rng: np.random.Generator, world: str, limits: str, parts: int) -> t
     return problem, make_plane(problem, EVERYWHERE, parts), float(rng.uniform(250.0, 330.0))
 
 
+@pytest.mark.nightly_but("hills-bare", "hills-clearance")
 @pytest.mark.first_quick
 @pytest.mark.draws
 @pytest.mark.parametrize("limits", LIMITS)
@@ -221,6 +222,7 @@ def test_ways_in_the_mesh_for_paths_pass_the_exact_check(world: str, limits: str
     assert held > 20
 
 
+@pytest.mark.nightly_but("agl-bare", "hills-errors", "hills-bare")
 @pytest.mark.first_quick
 @pytest.mark.draws
 @pytest.mark.parametrize("limits", LIMITS)
@@ -250,6 +252,7 @@ def test_the_mesh_for_bounds_has_the_straight_way_wherever_the_exact_check_passe
     assert held > 25
 
 
+@pytest.mark.nightly_but("hills-3")
 @pytest.mark.slow
 @pytest.mark.parametrize("fineness", [3, 6])
 @pytest.mark.parametrize("world", ["hills", "turned"])

@@ -48,6 +48,7 @@ def mission(zones: list[Zone], reach_m: float, via: tuple[Via, ...] = ()) -> Pro
     return Problem(Airspace(FLAT, zones), limits, (-1500.0, 0.0, 40.0), (1500.0, 0.0, 40.0), via)
 
 
+@pytest.mark.nightly_but("18", "9")
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", seeds(10, 35, 60))
 def test_bound_and_path_enclose_the_visibility_graphs_track(seed: int) -> None:

@@ -247,6 +247,7 @@ def test_ways_are_as_long_as_the_shortest_by_visibility_there_and_back(form: str
     assert exact > 0.8 * compared
 
 
+@pytest.mark.nightly_but("turned")
 @pytest.mark.slow
 @pytest.mark.parametrize("form", EACH_FORM)
 def test_where_walls_touch_exactly_ways_are_legal_and_no_detours(form: str) -> None:
@@ -390,6 +391,7 @@ def test_a_flood_says_of_no_piece_that_it_is_farther_than_it_is(slack: float, fo
     assert compared > 5
 
 
+@pytest.mark.nightly_but("1-plain", "1-turned")
 @pytest.mark.slow
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("block", [pytest.param(1, marks=pytest.mark.slow), 4])

@@ -136,7 +136,7 @@ def shortest(
     return math.inf, []
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.draws
 def test_intervals_of_the_shortest_track_of_brute_force_are_never_shut() -> None:
     found = above = 0

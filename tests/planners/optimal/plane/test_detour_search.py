@@ -223,7 +223,7 @@ def test_laps_are_flown_under_one_zone_to_get_over_another() -> None:
     assert best - 1.0 <= below.cost <= 1.005 * best
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_what_is_shut_for_one_cap_is_looked_at_again_for_the_best_path() -> None:
     # A path around both is shorter than one over both; a path over one of them, with laps, is the shortest.
     p = crossing(box(300.0, 0.0, 400.0, 1900.0, None, 40.0), box(1500.0, 300.0, 1600.0, 2000.0, None, 70.0))

@@ -47,7 +47,7 @@ def test_bound_over_several_legs_goes_on_while_legs_get_better() -> None:
     assert found.gap < 0.2
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_cost_that_the_climb_alone_exceeds_leaves_no_track() -> None:
     """Few metres of track and a climb that costs most: the length left for the track was negative."""
     axis = np.arange(0.0, 2001.0, 50.0)

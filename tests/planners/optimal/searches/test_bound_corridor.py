@@ -84,7 +84,7 @@ def test_stops_are_passed_as_before() -> None:
     assert faults(below.problem, Path(below.best)) == []
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_planner_asks_for_it() -> None:
     work = through(0.1)
     improve(work)

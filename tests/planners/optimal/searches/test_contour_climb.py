@@ -56,6 +56,7 @@ def test_a_slope_under_a_low_zone_is_climbed_aslant(objective: str) -> None:
     assert solution.lower_bound <= p.cost(solution.path)
 
 
+@pytest.mark.nightly_but("length")
 @pytest.mark.slow
 @pytest.mark.parametrize("objective", ["length", "energy"])
 def test_the_track_over_the_lattice_has_way_enough_to_climb(objective: str) -> None:
@@ -65,7 +66,7 @@ def test_the_track_over_the_lattice_has_way_enough_to_climb(objective: str) -> N
     assert 1200.0 + 5.0 * (SLOPE * 400.0 - ROOM_M) - 1.0 <= track_m <= 2200.0
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_path_over_such_a_track_is_better_than_one_with_laps() -> None:
     p = under_a_lid()
     below = looked(p).incumbent

@@ -62,6 +62,7 @@ def test_a_first_path_is_legal_by_brute_force_and_near_the_best_that_patience_fo
     assert cost_of(case.problem, points) <= (1.0 + part) * cost_of(case.problem, best)
 
 
+@pytest.mark.nightly_but("0.5-0.0")
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("gap_m", "clearance_m"), [(1e-3, 0.0), pytest.param(0.5, 0.0, marks=pytest.mark.slow), (0.02, 7.0)]
@@ -84,7 +85,7 @@ def test_a_slit_between_cylinders_is_flown_through(gap_m: float, clearance_m: fl
     assert exact - 1e-6 <= cost_of(p, found[0]) <= 1.0005 * exact
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_only_a_cheaper_path_is_returned_and_the_same_one_each_time() -> None:
     case = flat([(1000.0, 1000.0, 80.0)])
     p = case.problem
@@ -99,7 +100,7 @@ def test_only_a_cheaper_path_is_returned_and_the_same_one_each_time() -> None:
     assert small_path(replace(p, budget=spent_budget()), detour) is None
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_stops_are_passed_in_their_order_at_their_heights() -> None:
     via = (Via(1100.0, 1150.0, 40.0), Via(900.0, 850.0))
     case = flat([(1000.0, 1000.0, 80.0)], via)
@@ -163,7 +164,7 @@ def test_it_has_a_turn_without_a_path_one_beyond_a_large_gap_and_one_at_last() -
     assert not near.is_open()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_planner_finds_passes_exactly_as_high_as_the_ceiling() -> None:
     case = make("passes", 2)
     solution = plan(replace(case.problem, gap_percent=1.0))
