@@ -152,6 +152,7 @@ def test_over_flat_ground_it_hits_that_and_reports_it(below: Plan) -> None:
     assert "m above the mission's ground: without terrain an SITL's ground is flat" in str(breach.message)
 
 
+@pytest.mark.slow
 def test_addresses_off_this_machine_are_refused_before_anything_is_opened(planned: Plan) -> None:
     with pytest.raises(UsageError, match="--i-know"):
         rehearse_in_sitl(planned, addresses={"uav1": "tcp:192.0.2.1:5760", "uav2": "tcp:127.0.0.1:5760"})

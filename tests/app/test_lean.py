@@ -91,6 +91,7 @@ def test_a_slowest_speed_above_what_the_default_allows_is_no_reason_to_refuse() 
     assert done.vehicles[0].request.vehicle.speed_min_m_s == 10.0
 
 
+@pytest.mark.slow
 @pytest.mark.first_quick
 @pytest.mark.parametrize(("lean_deg", "speed_m_s"), [(45, 15.0), (80, 15.0), (36, 12.0), (10, 10.0 / 3.0)])
 def test_a_lean_angle_of_the_file_bounds_the_speed(lean_deg: float, speed_m_s: float) -> None:

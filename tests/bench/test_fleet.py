@@ -34,6 +34,7 @@ def test_the_mission_is_a_fleet_with_places_apart_and_each_system_id_once_on_a_l
             fleet_document(vehicles_, interval_s=interval_s)
 
 
+@pytest.mark.slow
 def test_samples_find_what_is_too_near() -> None:
     def straight(name: str, north_m: float, begin_s: float) -> TimedPath:
         points = np.array([[0.0, north_m, 50.0], [1000.0, north_m, 50.0]])
@@ -44,6 +45,7 @@ def test_samples_find_what_is_too_near() -> None:
     assert sampled([straight("a", 0.0, 0.0), straight("b", 0.0, 101.0)], 30.0) == (np.inf, 0)
 
 
+@pytest.mark.slow
 def test_samples_and_the_exact_separation_agree() -> None:
     near = 0
     for seed in range(12):

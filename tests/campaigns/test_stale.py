@@ -33,6 +33,7 @@ def test_a_planted_fault_is_found(fault: str, monkeypatch: pytest.MonkeyPatch) -
     assert found[0].startswith("seed ")
 
 
+@pytest.mark.slow
 def test_a_killed_batch_is_found_if_outputs_are_not_compared(monkeypatch: pytest.MonkeyPatch) -> None:
     """It leaves files that differ from the record beside them."""
     monkeypatch.setattr("gcsplan.app.batch.has_outputs", lambda folder, digests: True)

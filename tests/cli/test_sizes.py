@@ -10,6 +10,7 @@ import pytest
 from tests.campaigns import sizes
 
 
+@pytest.mark.slow
 def test_items_are_counted(run: Any) -> None:
     code, _, err = run(*sizes.write("items", 10_001))
     assert code == 2

@@ -89,6 +89,7 @@ def test_a_return_that_is_reported_is_a_warning_with_one_headline_in_every_comma
     assert "UNSAFE" not in text
 
 
+@pytest.mark.slow
 @pytest.mark.nightly_but("check-option", "plan-file")
 @pytest.mark.first_quick
 @pytest.mark.parametrize("how", ["file", "option"])

@@ -12,6 +12,7 @@ from gcsplan.logs.tlog import read_telemetry
 from tests.support.flight_logs import tlog, within
 
 
+@pytest.mark.slow
 @pytest.mark.first_quick
 @pytest.mark.parametrize("status", [False, True])
 def test_a_ground_stations_log(tmp_path: Path, status: bool) -> None:

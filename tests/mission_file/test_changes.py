@@ -85,6 +85,7 @@ def outcome(file: Path, changes: list[MissionChange]) -> dict[str, str] | str:
         return str(why).replace(" (line", "\n(line").splitlines()[0].rpartition(": ")[2]
 
 
+@pytest.mark.slow
 @pytest.mark.nightly_but("2", "0")
 @pytest.mark.parametrize("seed", seeds(1, 3, 20))
 def test_options_and_the_saved_file_give_the_same_bytes(tmp_path: Path, seed: int) -> None:

@@ -42,6 +42,7 @@ def test_a_change_of_the_source_is_never_answered_with_older_code(room: Path) ->
     assert notices(room, 3.0) == []
 
 
+@pytest.mark.slow
 @pytest.mark.first_quick
 @pytest.mark.parametrize(
     "spoilt",

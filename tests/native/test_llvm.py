@@ -22,6 +22,7 @@ def test_this_llvm_reads_what_is_shipped() -> None:
     assert set(HostMachine().link(code, tuple(WORLD.forms))) == {"judge", "pieces", "around", "local_extrema"}
 
 
+@pytest.mark.slow
 def test_bitcode_that_this_llvm_cannot_read_is_made_anew_from_source(room: Path) -> None:
     of = kernels(room)
     digest = of.digest()

@@ -14,6 +14,7 @@ from gcsplan.native.signature import Held, read_forms
 from tests.support.toy_kernels import arguments, expected, kernels, ship, value
 
 
+@pytest.mark.slow
 def test_only_arguments_of_the_right_form_reach_machine_code(room: Path) -> None:
     ship(kernels(room))
     weigh = kernels(room)["weigh"]

@@ -74,6 +74,7 @@ def test_the_briefing_says_what_where_and_when_and_has_lines_to_sign_on() -> Non
     assert "not on this page" not in text
 
 
+@pytest.mark.slow
 def test_what_a_large_fleet_leaves_out_is_said_and_the_first_to_arrive_are_shown() -> None:
     page = small_page()
     slow = [replace(page.subjects[0], name=f"uav{i}", motion=None) for i in range(9)]

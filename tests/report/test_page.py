@@ -44,6 +44,7 @@ SURFACE_DEM = "surface DEM: trees and buildings as the radar saw them; newer one
 # -- the whole page -----------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_plans_report_says_what_the_pilot_must_know() -> None:
     text = Reader(planned_page()).text
     verdict = planned().vehicles[0].verdict
@@ -211,6 +212,7 @@ def test_the_uploads_end_is_told() -> None:
 # -- hostile names ------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_hostile_name_is_words_and_nothing_else() -> None:
     page = small_page()
     zones = tuple(replace(z, name=HOSTILE) for z in ZONES)

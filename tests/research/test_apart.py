@@ -78,6 +78,7 @@ def without_research(folder: Path) -> dict[str, Ended]:
     })  # fmt: skip
 
 
+@pytest.mark.slow
 def test_optimal_plans_without_the_research_folder(without_research: dict[str, Ended], folder: Path) -> None:
     assert without_research["optimal"].code == 0, without_research["optimal"].err
     assert list((folder / "out").glob("*.waypoints"))

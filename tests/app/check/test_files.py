@@ -473,6 +473,7 @@ def test_without_a_mission_file_the_options_are_named_and_with_one_its_keys(
     assert "the return home is not judged: its altitude is the vehicle's own (give --rtl-altitude)" in out
 
 
+@pytest.mark.slow
 def test_a_plans_own_fence_is_held_against_it(run: Any, folder: Path, world: list[str]) -> None:
     plan = json.loads(Path(file_of(folder, "round")).read_text())
     lat, lon = corpus.degrees(1000, -1600)

@@ -85,6 +85,7 @@ WALL = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 def test_rally_points_are_in_no_change_by_keys_and_no_trial() -> None:
     """Trials are judged without rally points, so that nothing is said of returns to them."""
     done = plan(load_mission(Path("wall.yaml"), text=yaml.safe_dump(WALL)))

@@ -289,6 +289,7 @@ def test_msfoa_plans_by_priority_with_those_before_in_view(monkeypatch: pytest.M
     assert done.fleet.slot("uav1").depart_s == 0.0
 
 
+@pytest.mark.slow
 def test_the_fleet_of_four_arrives_in_its_order_and_keeps_apart() -> None:
     text = (MISSIONS / "fleet-4.yaml").read_text().replace("gap_percent: 0.1", "gap_percent: 2")
     done = plan(load_mission("fleet-4.yaml", text=text))

@@ -12,6 +12,7 @@ from tests.app.fleet.test_fleet import CROSS
 from tests.support.paths import DATA
 
 
+@pytest.mark.slow
 def test_the_same_fleet_twice_gives_the_same_bytes() -> None:
     text = yaml.safe_dump(CROSS | {"arrival": {"mode": "together", "separation_m": 30}})
     first, second = (outputs_of(plan(load_mission("fleet.yaml", text=text))) for _ in range(2))

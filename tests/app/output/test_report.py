@@ -12,6 +12,7 @@ from gcsplan.units import AVIATION
 from tests.app.fleet.test_fleet import planned, sequence
 
 
+@pytest.mark.slow
 def test_a_note_is_sentence_and_data_in_json_and_in_units_on_page_and_terminal(
     capsys: pytest.CaptureFixture[str],
 ) -> None:

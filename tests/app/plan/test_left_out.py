@@ -63,6 +63,7 @@ def wires(done: Plan) -> list[list[object]]:
     return [[item.wire for item in v.mission.items] for v in done.vehicles]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("bad", "reason", "of"),
     [

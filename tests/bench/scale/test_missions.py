@@ -13,6 +13,7 @@ from gcsplan.world.geodesy.frame import Frame
 from gcsplan.world.terrain.terrain import TerrainSpec, load_terrain
 
 
+@pytest.mark.slow
 def test_missions_are_those_of_their_seed_and_5_to_40_km_long(tmp_path: Path) -> None:
     files = make_missions(tmp_path, 60, 3, tmp_path / "tiles")
     contents = [yaml.safe_load(file.read_text(encoding="utf-8")) for file in files]

@@ -46,6 +46,7 @@ def test_made_terrain_has_posts_of_thirty_metres_and_hills() -> None:
     assert np.ptp(surface.ground_m) > 50.0
 
 
+@pytest.mark.slow
 def test_the_kind_keeps_the_objectives_of_its_missions(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(under_ceiling, "CEILING_MISSIONS", 3)
     found = problems("ceiling", seed=3, errors=False)

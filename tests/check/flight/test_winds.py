@@ -100,6 +100,7 @@ def test_a_set_holds_every_wind_of_it_in_window_and_energy(autopilot: Autopilot)
         assert (spent_j(one) <= spent_j(whole) + 1e-6).all()
 
 
+@pytest.mark.slow
 @pytest.mark.first_quick
 @pytest.mark.parametrize("base_w", [0.0, 200.0])
 def test_out_and_back_in_one_wind_counts_its_headwind_once(base_w: float) -> None:

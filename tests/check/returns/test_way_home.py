@@ -296,6 +296,7 @@ def test_a_mission_that_hugs_a_zone_is_not_called_shut_in() -> None:
     assert stretch.from_m == pytest.approx(231.0 + 900.0 + 0.0, abs=60.0)
 
 
+@pytest.mark.slow
 def test_each_autopilot_gets_rally_points_at_the_altitude_that_it_understands() -> None:
     def slope(east: Floats, north: Floats) -> Floats:
         return 300.0 + 0.02 * east + 0.0 * north

@@ -33,6 +33,7 @@ def test_check_passes_what_plan_wrote_and_finds_what_was_spoilt(run: Any, tmp_pa
     assert "too low above ground" in out
 
 
+@pytest.mark.slow
 def test_what_cannot_be_judged_is_exit_4_unless_allowed(run: Any, tmp_path: Path) -> None:
     assert run("plan", CROSSING, "-o", "out")[0] == 0
     text = (tmp_path / "out" / "uav1.waypoints").read_text()

@@ -98,6 +98,7 @@ def test_what_mavproxy_cuts_is_named_judged_and_taken(run: Any, url: str) -> Non
     assert run(*verify, "--mission", CROSSING)[0] == 7
 
 
+@pytest.mark.slow
 def test_what_is_on_board_is_judged_and_not_the_file(run: Any, url: str) -> None:
     """Every way point 3 m lower: the file is safe, and what is on board flies too low."""
 

@@ -106,6 +106,7 @@ def test_whatever_is_flown_the_motion_is_whole_and_faster_is_never_later(seed: i
     assert slower.time_s(12.0) == slower.time_s(1.0) == way.time_s(3.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("length_m", "accel_m_s2", "jerk_m_s3"), [(118.086, 3.0, 4.0), (15.1, 4.47, 2.6)])
 def test_a_faster_leg_is_never_later_where_its_speed_is_hardly_reached(
     length_m: float, accel_m_s2: float, jerk_m_s3: float

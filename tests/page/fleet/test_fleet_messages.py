@@ -68,6 +68,7 @@ def test_a_vehicle_that_is_left_out_keeps_its_number_and_says_why(desk: Desk) ->
     assert found["verdict"] != "safe"
 
 
+@pytest.mark.slow
 def test_the_form_is_that_of_the_chosen_vehicle(desk: Desk) -> None:
     desk.ask("change", "plan", changes={"vehicles[1]": SECOND, **APART})
     fields = {field["key"]: field["value"] for field in desk.ask("vehicle", "state", vehicle=1)["form"]}

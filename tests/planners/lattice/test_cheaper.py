@@ -33,6 +33,7 @@ def past_a_zone() -> tuple[Problem, tuple[Floats, Floats]]:
     return p, (under, over)
 
 
+@pytest.mark.slow
 def test_a_line_is_pulled_on_the_side_of_a_zone_that_its_path_passes_it_on() -> None:
     p, (under, over) = past_a_zone()
     ends, free = np.array([True, False, False, True]), np.full(4, np.nan)

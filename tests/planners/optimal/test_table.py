@@ -50,6 +50,7 @@ def test_searches_that_options_leave_out_are_not_made_and_unknown_names_are_refu
         all_searches(work_of(replace(AROUND, options={"without": "outline"})))
 
 
+@pytest.mark.slow
 def test_a_search_sets_no_attribute_of_another_and_keeps_its_own() -> None:
     """A `Layer` and a `Narrow` are made by the search itself."""
     for path in sorted(Path(searches.__path__[0]).glob("*.py")):

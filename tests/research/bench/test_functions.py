@@ -52,6 +52,7 @@ def test_no_experiment_is_marked_by_mistake() -> None:
             assert not PrintedWolf(values.mean(), values.std(ddof=ddof), values.min()).fault
 
 
+@pytest.mark.slow
 def test_a_claim_holds_only_where_the_runs_say_so() -> None:
     rng = np.random.default_rng(5)
     low, high = rng.random(40), 2.0 + rng.random(40)

@@ -20,6 +20,7 @@ def ring_of(kind: str, count: int, seed: int) -> Floats:
     return np.array((smooth if kind == "smooth" else spiky)(count, random.Random(seed)))
 
 
+@pytest.mark.slow
 @pytest.mark.nightly_but("False-0.5-spiky", "True-0.5-spiky", "True-0.5-smooth")
 @pytest.mark.first_quick
 @pytest.mark.parametrize("kind", ["smooth", "spiky"])

@@ -450,6 +450,7 @@ def test_a_unit_that_contradicts_or_is_unknown_is_refused(tmp_path: Path) -> Non
     assert "furlong" in str(refusal(degrees_tif(tmp_path / "b.tif", units=("furlong",))))
 
 
+@pytest.mark.slow
 def test_a_raster_that_does_not_say_its_datum_needs_the_key(tmp_path: Path) -> None:
     error = refusal(degrees_tif(tmp_path / "a.tif"), vertical_datum=None)
     assert error.where == "m: terrain.vertical_datum"

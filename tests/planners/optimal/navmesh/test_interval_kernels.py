@@ -101,6 +101,7 @@ def test_no_altitude_that_the_exact_check_passes_is_shut(turned: bool, parts: in
     assert near > 1000
 
 
+@pytest.mark.slow
 @pytest.mark.first_quick
 @pytest.mark.parametrize(("slope", "open_"), [(0.05, True), (0.5, False)])
 @pytest.mark.parametrize("under", [True, False])

@@ -41,6 +41,7 @@ def disc() -> Floats:
     return zones
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2])
 def test_nodes_see_the_ground_under_the_zone_within_reach(seed: int) -> None:
     ground, x, y = lattice(seed)

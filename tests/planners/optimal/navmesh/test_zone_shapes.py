@@ -31,6 +31,7 @@ def shut_by(problem: Problem, fit: Fit, places: Floats) -> Bools:
     return inside
 
 
+@pytest.mark.slow
 @pytest.mark.nightly_but("fit1-0.03-None", "fit0-0.004-None", "fit0-0.0-None")
 @pytest.mark.first_quick
 @pytest.mark.parametrize("ceiling", [None, Level(80.0, "agl")])

@@ -51,6 +51,7 @@ def test_bound_of_a_climb_in_front_of_a_ridge_holds_whatever_bounds_came_before(
         assert found_m <= limit_m
 
 
+@pytest.mark.slow
 @pytest.mark.first_quick
 @pytest.mark.parametrize("cell_m", [(20.0, 20.0), (20.0, 10.0)])
 def test_little_memory_makes_cells_larger_instead_of_failing(cell_m: tuple[float, float]) -> None:

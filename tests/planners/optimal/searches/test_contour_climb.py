@@ -40,6 +40,7 @@ def under_a_lid() -> Problem:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.first_quick
 @pytest.mark.parametrize("objective", ["length", pytest.param("energy", marks=pytest.mark.slow)])
 def test_a_slope_under_a_low_zone_is_climbed_aslant(objective: str) -> None:

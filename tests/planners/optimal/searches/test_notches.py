@@ -59,6 +59,7 @@ def test_a_path_leads_through_what_is_open_by_centimetres(
     assert problem.cost(optimal.plan(problem).path) > ROUND_M, "the notch is too wide to show anything"
 
 
+@pytest.mark.slow
 @pytest.mark.nightly_but("0.1-0.2-80.0", "0.1-0.0-120.0")
 @pytest.mark.first_quick
 @pytest.mark.parametrize(("over_m", "askew", "half_m"), CASES)
