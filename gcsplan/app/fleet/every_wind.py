@@ -20,6 +20,7 @@ from gcsplan.figures import floored, raised
 from gcsplan.fleet.arrival import Hold, Mode, Schedule
 from gcsplan.fleet.intervals import Interval
 from gcsplan.fleet.motion.timing import Course, flown_corners
+from gcsplan.fleet.resolve import NotSeparated
 from gcsplan.wind.drift import Drifts
 
 __all__ = ["NotInEveryWind", "at_speeds", "corners_cut_m", "drifts", "require_intervals", "steadier", "with_cures"]
@@ -127,6 +128,8 @@ def with_cures(why: NoMission, vehicles: Sequence[VehiclePlan], brief: Brief, ag
     wind."""
     if len(vehicles) > MOST_TRIED or not (isinstance(why, NotInEveryWind) or why.reason == "separation"):
         return why
+    if isinstance(why, NotSeparated) and why.goals_m is not None and why.interval_s is None:
+        return why  # goals so near that no departure, speed or path helps; it says how far apart they must be
     found = [
         *_windows(why, vehicles, brief, again),
         *_gates(vehicles, brief, again),

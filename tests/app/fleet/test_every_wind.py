@@ -173,3 +173,14 @@ def test_no_wind_that_is_drawn_breaks_a_time_table_that_holds_in_all(seed: int) 
             apart_s = tracks[b].arrive_s - tracks[a].arrive_s
             assert found.least_s - WITHIN_S <= apart_s <= found.most_s + WITHIN_S
         assert least_m(list(tracks.values())) >= SEPARATION_M - WITHIN_M
+
+
+@pytest.mark.slow
+def test_goals_on_one_pad_are_refused_without_a_search_for_cures() -> None:
+    mission = fan("cc", {"up_to_m_s": 3}, {"mode": "sequence", "interval_s": 30, "window_s": 10, "gates": "auto"})
+    for vehicle in mission["vehicles"]:
+        vehicle |= {"goal": {"east_m": 0.0, "north_m": 900.0}, "end": "land"}
+    with pytest.raises(NoMission, match="put the goals at least") as refused:
+        plan(mission)
+    assert "what works" not in str(refused.value)
+    assert "tried" not in str(refused.value)
