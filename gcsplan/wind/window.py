@@ -34,14 +34,14 @@ _ONE = np.zeros((1, 2, 2))
 
 @dataclass(frozen=True, eq=False, slots=True)
 class TimeWindow:
-    """The earliest and the latest time at each of N points, seconds after the departure."""
+    """(..., N) the earliest and the latest time at each of N points, seconds after the departure."""
 
     earliest_s: Floats
     latest_s: Floats
 
 
 class FlightClock(Protocol):
-    """The times of a flight at N points, for speeds over ground (P,) of its parts.
+    """The times of a flight at N points, for speeds over ground (..., P) of its parts.
 
     Where the wind depends on the height, several parts are pieces of one leg, which is flown at one largest speed.
     """
@@ -60,7 +60,7 @@ class FlightClock(Protocol):
         """(..., N) the sums of seconds of parts (..., P) up to each point, with all rounds."""
 
     def loose_s(self, slow_m_s: Floats, fast_m_s: Floats) -> Floats:
-        """(N,) by how much the seconds beyond the parts' lengths over speeds may at most fall, where speeds rise from
+        """(..., N) by how much the seconds beyond the parts' lengths over speeds may at most fall, where speeds rise from
         the first to the second."""
 
 
@@ -83,8 +83,8 @@ def window(winds: WindsAlong, clock: FlightClock) -> TimeWindow:
 
 
 def _nearer(clock: FlightClock, slow: Floats, fast: Floats, early: Floats, late: Floats) -> TimeWindow:
-    """The bounds of the times with the parts' speeds (P,) between two, and with the sums of their lengths over speeds
-    (N,) between two.
+    """The bounds of the times with the parts' speeds (..., P) between two, and with the sums of their lengths over
+    speeds (..., N) between two.
 
     They lie between the times at the legs' highest and lowest speeds. Nearer: what a flight takes beyond that sum
     hardly falls where speeds rise.
@@ -105,8 +105,8 @@ def _within(winds: WindsAlong, clock: FlightClock, cells: Floats) -> list[TimeWi
     The sum of lengths over speeds is convex in the wind, so no more than at a corner, and no less than its tangent.
     """
     corner, fast, early, late = _sums(winds.bounds(cells), winds, clock)
-    rows = zip(corner.min(axis=1), fast, early.min(axis=1), late.max(axis=1), strict=True)
-    return [_nearer(clock, *row) for row in rows]
+    found = _nearer(clock, corner.min(axis=1), fast, early.min(axis=1), late.max(axis=1))
+    return [TimeWindow(*row) for row in zip(found.earliest_s, found.latest_s, strict=True)]
 
 
 def _sums(found: SpeedBounds, winds: WindsAlong, clock: FlightClock) -> tuple[Floats, Floats, Floats, Floats]:
@@ -148,17 +148,18 @@ def witnessed(winds: WindsAlong, clock: FlightClock, still_m_s: Floats) -> Witne
         at = clock.between(*clock.even_m_s(slow[0], fast[0]))
         return _alike(at, slow.min(axis=0), fast.max(axis=0), still_m_s)
     # The motion is computed for neighbouring cells together: it is what takes the time.
-    for some in np.array_split(np.arange(len(fast)), min(CELL_GROUPS, len(fast))):
-        low, high = clock.even_m_s(slow[some].min(axis=0), fast[some].max(axis=0))
-        rough, loose_s = clock.between(low, high), clock.loose_s(low, high)
-        at_low, at_high = clock.summed(clock.run_m / low), clock.summed(clock.run_m / high)
-        early[some] += rough.latest_s - at_low - loose_s
-        late[some] += rough.earliest_s - at_high + loose_s
-        # A cell's bounds are means of its corners', or the same for all of it: whichever are nearer.
-        apart = (late[some] - early[some]).max(axis=1)
-        flat = (apart >= rough.latest_s - rough.earliest_s)[:, None]
-        early[some] = np.where(flat, rough.earliest_s, early[some])
-        late[some] = np.where(flat, rough.latest_s, late[some])
+    groups = np.array_split(np.arange(len(fast)), min(CELL_GROUPS, len(fast)))
+    low, high = clock.even_m_s(*(np.array(each) for each in (
+        [slow[some].min(axis=0) for some in groups], [fast[some].max(axis=0) for some in groups],
+    )))  # fmt: skip
+    rough, loose_s = clock.between(low, high), clock.loose_s(low, high)
+    of = np.repeat(np.arange(len(groups)), [len(some) for some in groups])
+    early += (rough.latest_s - clock.summed(clock.run_m / low) - loose_s)[of, None]
+    late += (rough.earliest_s - clock.summed(clock.run_m / high) + loose_s)[of, None]
+    # A cell's bounds are means of its corners', or the same for all of it: whichever are nearer.
+    flat = ((late - early).max(axis=1) >= (rough.latest_s - rough.earliest_s)[of])[:, None]
+    early = np.where(flat, rough.earliest_s[of, None], early)
+    late = np.where(flat, rough.latest_s[of, None], late)
     top = np.minimum(found.top_m_s, winds.ability.most_m_s)[:, None]
     beyond = np.where(found.top_m_s < winds.ability.most_m_s, 1.0, 0.0)[:, None] * found.beyond_m_s
     slower, faster = still_m_s / corner - 1.0, 1.0 - still_m_s / top + still_m_s * beyond / top**2

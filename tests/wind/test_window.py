@@ -36,8 +36,8 @@ class Timer:
         return slow_m_s, fast_m_s
 
     def between(self, slow_m_s: Floats, fast_m_s: Floats) -> TimeWindow:
-        self.timed += 1
-        return TimeWindow(np.cumsum(RUN_M / fast_m_s), np.cumsum(RUN_M / slow_m_s))
+        self.timed += slow_m_s.size // len(RUN_M)
+        return TimeWindow(np.cumsum(RUN_M / fast_m_s, axis=-1), np.cumsum(RUN_M / slow_m_s, axis=-1))
 
     def summed(self, seconds: Floats) -> Floats:
         return np.cumsum(seconds, axis=-1)

@@ -19,7 +19,7 @@ import numpy as np
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.check.motion.project import ends_of
 from gcsplan.check.motion.stretch import Stretch
-from gcsplan.fleet.motion.timing import legs, upright
+from gcsplan.fleet.motion.timing import legs, lays, upright
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.geodesy.frame import Frame
 from gcsplan.world.terrain.vehicle_terrain import VehicleTerrain
@@ -103,15 +103,18 @@ class FlightTimes:
                 )
 
     def seconds(self, ground_m_s: Floats | None = None) -> Floats:
-        """(N,) seconds in still air, or where the `parts` are flown at ``ground_m_s`` (P,) at most."""
-        seconds, done = self._columns_s.copy(), 0
+        """(..., N) seconds in still air, or where the `parts` are flown at ``ground_m_s`` (..., P) at most."""
+        flights: tuple[int, ...] = () if ground_m_s is None else ground_m_s.shape[:-1]
+        if ground_m_s is not None and flights and not lays(self.vehicle):
+            return np.array([self.seconds(one) for one in ground_m_s])
+        seconds, done = np.tile(self._columns_s, (*flights, 1)) if flights else self._columns_s.copy(), 0
         for run in self._runs:
             count = len(run.owner)
-            wind = None if ground_m_s is None else ground_m_s[done : done + count]
+            wind = None if ground_m_s is None else ground_m_s[..., done : done + count]
             done += count
             way = legs(run.points, self.vehicle, run.owner, **run.keys, pace=run.speed_m_s, ground_m_s=wind)
             if way is not None:
-                seconds[run.first : run.last] = way.shares_s(1.0, run.last - run.first)
+                seconds[..., run.first : run.last] = way.shares_s(1.0, run.last - run.first)
         return seconds
 
     @property

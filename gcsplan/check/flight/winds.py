@@ -285,7 +285,7 @@ class FlightInWind:
         blown_m += self._gust_air_m(moving_s)
         if self.vehicle.energy.base_w and len(cells) > 1:  # else times cost nothing
             groups = np.array_split(slows, _TIMED_CELLS)
-            moving_s = most(np.array([self._moving_s(self.even_m_s(g.min(axis=0), g[0])[0]) for g in groups]))
+            moving_s = most(self._moving_s(self.even_m_s(np.array([g.min(axis=0) for g in groups]), slows[0])[0]))
         held_s = self._held_s[1].copy()
         for k in np.flatnonzero(self._waits).tolist():  # the earlier it comes, the longer it waits
             assert self.window is not None
@@ -293,7 +293,7 @@ class FlightInWind:
         return Costs(air_m + blown_m + later_s * fastest, moving_s + later_s, held_s, wind_m_s)
 
     def _moving_s(self, slow_m_s: Floats) -> Floats:
-        """(N,) the most seconds of each stretch, if no part is flown slower than this, and none earlier than in still
+        """(..., N) the most seconds of each stretch, if no part is flown slower than this, and none earlier than in still
         air."""
         return np.maximum(self._seconds(slow_m_s) + (not self.wind.single) * self._uneven_s, self._still_s)
 
@@ -344,13 +344,13 @@ class FlightInWind:
         return np.concatenate([np.zeros((*sums.shape[:-1], 1)), sums], axis=-1)[..., upto]
 
     def loose_s(self, slow_m_s: Floats, fast_m_s: Floats) -> Floats:
-        """(N,) by how much what is beyond lengths over speeds may fall where speeds rise: at joints, where an aircraft
+        """(..., N) by how much what is beyond lengths over speeds may fall where speeds rise: at joints, where an aircraft
         speeds up and brakes."""
         per_m_s = (COUPLED_SMOOTH if self.vehicle.smooths else COUPLED) / self.vehicle.accel_m_s2
         least_s, most_s = self._held_s
         joints_s = self._totals((fast_m_s - slow_m_s) * per_m_s / np.repeat(self._cuts, self._cuts))
-        after_s = np.append(joints_s[1:], joints_s[-1:])  # the joint to the next stretch
-        begun_s = np.where(self._gate >= 0, joints_s[self._gate], 0.0)
+        after_s = np.concatenate([joints_s[..., 1:], joints_s[..., -1:]], axis=-1)  # the joint to the next stretch
+        begun_s = np.where(self._gate >= 0, joints_s[..., self._gate], 0.0)
         return after_s - begun_s + self._since_gate(np.cumsum((most_s - least_s + 2.0 * self._uneven_s) * self._rounds))
 
     def even_m_s(self, slow_m_s: Floats, fast_m_s: Floats) -> tuple[Floats, Floats]:
@@ -362,23 +362,24 @@ class FlightInWind:
         return np.repeat(low, self._cuts, axis=-1), np.repeat(high, self._cuts, axis=-1)
 
     def _seconds(self, even_m_s: Floats) -> Floats:
-        """(N,) seconds of the stretches, with all pieces of a leg at most at one speed."""
-        return self.times.seconds(even_m_s[np.cumsum(self._cuts) - 1])
+        """(..., N) seconds of the stretches, with all pieces of a leg at most at one speed."""
+        return self.times.seconds(even_m_s[..., np.cumsum(self._cuts) - 1])
 
     def between(self, slow_m_s: Floats, fast_m_s: Floats) -> TimeWindow:
         """The window where each part is flown at most at a speed between two; these are even."""
         least_s, most_s = self._held_s
         latest = earliest = self._seconds(slow_m_s)
-        differ = np.zeros(len(self.stretches), dtype=np.bool_)
-        np.logical_or.at(differ, self._parts.stretch, slow_m_s != fast_m_s)
+        differ = np.zeros(latest.shape, dtype=np.bool_)
+        np.logical_or.at(differ, (..., self._parts.stretch), slow_m_s != fast_m_s)
         if differ.any():
             # A leg ends in the turn to the next one.
-            uneven_s = np.where(
-                differ | np.append(differ[1:], False) | np.append(False, differ[:-1]), self._uneven_s, 0.0
-            )
+            beside = differ.copy()
+            beside[..., :-1] |= differ[..., 1:]
+            beside[..., 1:] |= differ[..., :-1]
+            uneven_s = np.where(beside, self._uneven_s, 0.0)
             latest, earliest = latest + uneven_s, np.maximum(self._seconds(fast_m_s) - uneven_s, 0.0)
         totals = ((earliest + least_s) * self._rounds, (latest + most_s) * self._rounds)
-        return TimeWindow(*(self._since_gate(np.cumsum(total)) for total in totals))
+        return TimeWindow(*(self._since_gate(np.cumsum(total, axis=-1)) for total in totals))
 
     @cached_property
     def _rounds(self) -> Floats:

@@ -177,6 +177,8 @@ class Curved:
     ``part_m`` (P,) are the parts' lengths so counted. The speed along a part is at most ``most_m_s`` (P,) and
     at most the cruise speed times ``per_cruise`` (P,). ``owner`` (P,) is the caller's number of each part. Parts that
     ``follows`` (P,) follow the ground, with ``rates_m_s`` (P, 2) of climb and descent (`trailing_s`).
+
+    ``per_cruise`` may be (K, P): so many flights over the same way, of which `shares_s` tells all at once.
     """
 
     knots: Floats
@@ -203,7 +205,7 @@ class Curved:
         return float(flown.time_s.sum() - overlap.sum() + lag.sum())
 
     def shares_s(self, cruise_m_s: float, legs: int) -> Floats:
-        """(``legs``,) the seconds of each leg, 0 to ``legs`` - 1 in ``owner``; together they are `time_s`.
+        """(..., ``legs``) the seconds of each leg, 0 to ``legs`` - 1 in ``owner``; together they are `time_s`.
 
         A leg ends in the middle of the turn, where ArduPilot counts its way point as reached.
         """
@@ -212,8 +214,9 @@ class Curved:
         seconds[1:] -= 0.5 * overlap
         seconds[:-1] -= 0.5 * overlap
         part_s, leg = self._part_s(cruise_m_s), self._leg
-        share = part_s / np.bincount(leg, weights=part_s)[leg]
-        return np.bincount(self.owner, weights=seconds[leg] * share, minlength=legs).astype(np.float64)
+        share = part_s / _summed(part_s, leg, len(self.way))[..., leg]
+        each = seconds.reshape(*part_s.shape[:-1], len(self.way))
+        return _summed(each[..., leg] * share, self.owner, legs)
 
     def motion(self, cruise_m_s: float, error_m: float = POSITION_ERROR_M) -> tuple[Floats, Floats, Indices]:
         """Times (M,) since the stretch began, places (M, 3) and legs (M,) at the end of each of M straight pieces.
@@ -244,27 +247,39 @@ class Curved:
         return np.floor(0.5 * (self.at[1:] + self.at[:-1])).astype(np.intp)
 
     def _part_s(self, cruise_m_s: float) -> Floats:
-        """(P,) seconds of each part at its highest speed."""
+        """(..., P) seconds of each part at its highest speed."""
         speed = np.minimum(self.most_m_s, cruise_m_s * self.per_cruise)
         if not self.follows.any():
             return np.asarray(self.part_m / speed)
-        return trailing_s(
-            self.part_m, np.diff(self.knots[:, 2]), self.rates_m_s, speed, self.follows,
-            FULL_ACCEL * self.vehicle.accel_m_s2, self.vehicle.vertical_accel_m_s2,
-        )  # fmt: skip
+        found = [
+            trailing_s(
+                self.part_m, np.diff(self.knots[:, 2]), self.rates_m_s, one, self.follows,
+                FULL_ACCEL * self.vehicle.accel_m_s2, self.vehicle.vertical_accel_m_s2,
+            )
+            for one in speed.reshape(-1, speed.shape[-1])
+        ]  # fmt: skip
+        return np.reshape(found, speed.shape)
 
     def _legs(self, cruise_m_s: float) -> tuple[Curves, Floats, Floats]:
         """The legs' curves at a cruise speed; the seconds (L - 1,) for which each overlaps with the next; and the
-        seconds (L,) by which the vehicle lags behind while it speeds up on each."""
-        run, rise = np.hypot(self.way[:, 0], self.way[:, 1]), self.way[:, 2]
+        seconds (L,) by which the vehicle lags behind while it speeds up on each.
+
+        Several flights stand one after another, as if it stood still between them: K·L legs.
+        """
+        part_s, count = self._part_s(cruise_m_s), len(self.way)
+        flights = part_s.size // part_s.shape[-1]
+        way, ends, begins = (np.tile(each, (flights, 1)) for each in (self.way, self.ends, self.begins))
+        run, rise = np.hypot(way[:, 0], way[:, 1]), way[:, 2]
         length = np.hypot(run, rise)
-        speed = length / np.bincount(self._leg, weights=self._part_s(cruise_m_s))
+        speed = length / _summed(part_s, self._leg, count).ravel()
         upward = np.full(len(length), self.vehicle.vertical_accel_m_s2)
         accel = along_slope(run, rise, np.full(len(length), FULL_ACCEL * self.vehicle.accel_m_s2), upward, upward)
         flown = curves(length, speed, accel, self.vehicle.leg_jerk_m_s3)
-        turns = _Turns.between(flown, (self.ends, self.begins), speed, self.vehicle)
-        overlap = _overlaps(turns)
-        slow = np.append(REST_M_S, np.maximum(turns.speed_m_s(overlap), REST_M_S))
+        joint = np.arange(1, len(length))
+        joint = joint[joint % count > 0]  # where the leg with this number follows one without a stop
+        turns = _Turns.between(flown, (ends, begins), speed, self.vehicle, joint)
+        overlap, slow, found = np.zeros(len(length) - 1), np.full(len(length), REST_M_S), _overlaps(turns)
+        overlap[joint - 1], slow[joint] = found, np.maximum(turns.speed_m_s(found), REST_M_S)
         lag = LAG_S * np.maximum(np.log(np.maximum(flown.peak_m_s / slow, 1.0)) - LAG_FROM, 0.0)
         return flown, overlap, lag
 
@@ -335,7 +350,7 @@ def curved(
         lean = leaning_m_s(vehicle.lean_angle_deg, slope, 0.5 * (p[1:, 2] + p[:-1, 2]))
         most = np.minimum(most, lean)
     if pace is not None:
-        per_cruise = per_cruise * pace[keep[1:]]
+        per_cruise = per_cruise * pace[..., keep[1:]]
     way = p[last] - p[first]
     level = np.where(cut, run / length, 1.0)
     way[several, 2] = 0.0
@@ -356,6 +371,13 @@ def _unit(way: Floats, instead: Floats) -> Floats:
     known = np.linalg.norm(way, axis=1) > _LEAST_CURVE_M
     course = np.where(known[:, None], way, instead)
     return np.asarray(course / np.linalg.norm(course, axis=1)[:, None])
+
+
+def _summed(values: Floats, bins: Indices, count: int) -> Floats:
+    """(..., ``count``) the sums of values (..., P) with the same number in ``bins`` (P,)."""
+    rows = values.reshape(-1, values.shape[-1])
+    found = [np.bincount(bins, weights=row, minlength=count) for row in rows]
+    return np.reshape(found, (*values.shape[:-1], count)).astype(np.float64)
 
 
 def _spread(begin: Floats, seconds: Floats, pieces: Indices) -> Floats:
@@ -425,15 +447,17 @@ class _Turns:
     vehicle: Vehicle
 
     @classmethod
-    def between(cls, flown: Curves, courses: tuple[Floats, Floats], speed_m_s: Floats, vehicle: Vehicle) -> _Turns:
-        """The turns between legs ``flown``, which may be as fast as ``speed_m_s`` (L,).
+    def between(
+        cls, flown: Curves, courses: tuple[Floats, Floats], speed_m_s: Floats, vehicle: Vehicle, after: Indices
+    ) -> _Turns:
+        """The turns into the legs ``after`` (T,) of legs ``flown``, which may be as fast as ``speed_m_s`` (L,).
 
         ``courses``: the directions in which each leg ends and begins, (L, 3) each.
         """
         ends, begins = courses
-        leg = np.arange(len(ends) - 1)
-        slower = np.minimum(speed_m_s[:-1], speed_m_s[1:])
-        return cls(flown.of(np.concatenate([leg, leg + 1])), ends[:-1], begins[1:], slower, vehicle)
+        slower = np.minimum(speed_m_s[after - 1], speed_m_s[after])
+        pairs = flown.of(np.concatenate([after - 1, after]))
+        return cls(pairs, ends[after - 1], begins[after], slower, vehicle)
 
     def of(self, turns: Indices) -> _Turns:
         """The turns with these indices."""

@@ -130,7 +130,8 @@ def legs(
     results from a cruise speed of 1, if that is not 1. ``rates_m_s`` (N - 1, 2) are the rates of climb and descent on
     each part, ``radius_m`` (N - 1,) PX4's acceptance radius at its end, if they are not the vehicle's own; ``follows``
     (N - 1,) the parts that follow the ground. ``ground_m_s`` (N - 1,) are the largest horizontal speeds in a wind,
-    which count in place of ``pace`` and of the largest lean angle.
+    which count in place of ``pace`` and of the largest lean angle; where it `lays` S-curves, (K, N - 1) are as many
+    flights.
 
     ArduPilot flies S-curves (`curved`) and PX4 smooths (`smoothed`) unless a motion key of the vehicle is not
     bounded; every other vehicle rounds its corners (`speeds`). A fixed wing keeps the airspeed that it indicates,
@@ -140,12 +141,17 @@ def legs(
         pace, rates_m_s = _in_air(points, vehicle, pace, rates_m_s)
     if ground_m_s is not None:
         pace, vehicle = ground_m_s, replace(vehicle, lean_angle_deg=None)
-    if vehicle.lays_curves and math.isfinite(vehicle.corner_accel_m_s2):
+    if lays(vehicle):
         numbers = np.arange(len(owner), dtype=np.intp) if leg is None else leg
         return curved(points, vehicle, owner, numbers, pace, rates_m_s, follows)
     if vehicle.smooths:
         return smoothed(points, vehicle, owner, pace, rates_m_s, radius_m)
     return rounded(points, vehicle, owner, pace, rates_m_s)
+
+
+def lays(vehicle: Vehicle) -> bool:
+    """Whether it flies S-curves (`curved`)."""
+    return vehicle.lays_curves and math.isfinite(vehicle.corner_accel_m_s2)
 
 
 def at_own_speed(way: Motion, speed_m_s: float) -> Motion:
