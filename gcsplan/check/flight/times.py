@@ -19,7 +19,7 @@ import numpy as np
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.check.motion.project import ends_of
 from gcsplan.check.motion.stretch import Stretch
-from gcsplan.fleet.motion.timing import legs, lays, upright
+from gcsplan.fleet.motion.timing import lays, legs, upright
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.geodesy.frame import Frame
 from gcsplan.world.terrain.vehicle_terrain import VehicleTerrain
