@@ -60,8 +60,8 @@ class FlightClock(Protocol):
         """(..., N) the sums of seconds of parts (..., P) up to each point, with all rounds."""
 
     def loose_s(self, slow_m_s: Floats, fast_m_s: Floats) -> Floats:
-        """(..., N) by how much the seconds beyond the parts' lengths over speeds may at most fall, where speeds rise from
-        the first to the second."""
+        """(..., N) by how much the seconds beyond the parts' lengths over speeds may at most fall, where speeds rise
+        from the first to the second."""
 
 
 def cover(wind: DeclaredWind) -> Floats:

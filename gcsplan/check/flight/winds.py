@@ -293,8 +293,8 @@ class FlightInWind:
         return Costs(air_m + blown_m + later_s * fastest, moving_s + later_s, held_s, wind_m_s)
 
     def _moving_s(self, slow_m_s: Floats) -> Floats:
-        """(..., N) the most seconds of each stretch, if no part is flown slower than this, and none earlier than in still
-        air."""
+        """(..., N) the most seconds of each stretch, if no part is flown slower than this, and none earlier than in
+        still air."""
         return np.maximum(self._seconds(slow_m_s) + (not self.wind.single) * self._uneven_s, self._still_s)
 
     @cached_property
@@ -344,8 +344,8 @@ class FlightInWind:
         return np.concatenate([np.zeros((*sums.shape[:-1], 1)), sums], axis=-1)[..., upto]
 
     def loose_s(self, slow_m_s: Floats, fast_m_s: Floats) -> Floats:
-        """(..., N) by how much what is beyond lengths over speeds may fall where speeds rise: at joints, where an aircraft
-        speeds up and brakes."""
+        """(..., N) by how much what is beyond lengths over speeds may fall where speeds rise: at joints, where an
+        aircraft speeds up and brakes."""
         per_m_s = (COUPLED_SMOOTH if self.vehicle.smooths else COUPLED) / self.vehicle.accel_m_s2
         least_s, most_s = self._held_s
         joints_s = self._totals((fast_m_s - slow_m_s) * per_m_s / np.repeat(self._cuts, self._cuts))
