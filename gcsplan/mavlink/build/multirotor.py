@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
 from gcsplan.mavlink.build.fixed_wing import build_wing
-from gcsplan.mavlink.build.order import Order, most_cm, split_legs, whole_cm, with_gates
+from gcsplan.mavlink.build.order import Order, most_cm, none_zero, split_legs, whole_cm, with_gates
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.autopilots import altitude_of_cm
@@ -186,7 +186,9 @@ def _round_heights(points: Floats, places_m: Floats, base_m: float, vehicle: Veh
     exact = np.zeros(len(points), np.bool_)
     for place in order.exact:
         exact |= np.hypot(*(points[:, :2] - place).T) < EXACT_M
-    return whole_cm((points[:, 2] - base_m) * 100.0, most_cm(run_m, up), most_cm(run_m, down), exact)
+    given_cm, up_cm, down_cm = (points[:, 2] - base_m) * 100.0, most_cm(run_m, up), most_cm(run_m, down)
+    cm = whole_cm(given_cm, up_cm, down_cm, exact)
+    return none_zero(cm, given_cm, up_cm, down_cm) if vehicle.autopilot is Autopilot.ARDUCOPTER else cm
 
 
 def _bearings(points: Floats) -> Floats:

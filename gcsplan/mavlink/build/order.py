@@ -191,6 +191,20 @@ def whole_cm(given_cm: Floats, up_cm: Floats, down_cm: Floats, fixed: Bools) -> 
     return near
 
 
+def none_zero(cm: NDArray[np.int_], given_cm: Floats, up_cm: Floats, down_cm: Floats) -> NDArray[np.int_]:
+    """(N,) the altitudes ``cm`` (N,) with 1 or -1 instead of 0, on the side of ``given_cm`` unless a leg beside it is
+    too steep there alone. For ArduCopter, which keeps its altitude at an item whose altitude is 0."""
+    found = cm.copy()
+    for k in np.flatnonzero(cm == 0).tolist():
+        near = 1 if given_cm[k] >= 0.0 else -1
+        for found[k] in (near, -near, near):
+            rise = np.diff(found[max(k - 1, 0) : k + 2])
+            beside = slice(max(k - 1, 0), k + 1)
+            if (rise <= up_cm[beside]).all() and (-rise <= down_cm[beside]).all():
+                break
+    return found
+
+
 def _between(
     near: NDArray[np.int_], low: NDArray[np.int_], high: NDArray[np.int_], up: NDArray[np.int_], down: NDArray[np.int_]
 ) -> NDArray[np.int_] | None:

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gcsplan.mavlink.build.order import MOVED_CM, most_cm, whole_cm
+from gcsplan.mavlink.build.order import MOVED_CM, most_cm, none_zero, whole_cm
 from tests.support.effort import draws
 
 LEGS = st.lists(st.tuples(st.floats(0.0, 6.0), st.floats(0.0, 6.0), st.floats(-5.0, 5.0)), min_size=1, max_size=4)
@@ -62,3 +62,14 @@ def test_altitudes_that_cannot_be_reached_are_the_nearest_centimetres() -> None:
     wanted = np.array([0.0, 50.4, 100.4])
     ten = np.full(2, 10.0)
     assert whole_cm(wanted, ten, ten, np.zeros(3, bool)).tolist() == [0, 50, 100]
+
+
+@given(st.lists(st.sampled_from([-101, -1, 0, 1, 2, 101]), min_size=2, max_size=6), st.integers(0, 300))
+def test_no_altitude_is_zero_where_zero_keeps_the_altitude(cm: list[int], most: int) -> None:
+    near, steep = np.array(cm), np.full(len(cm) - 1, float(most))
+    found = none_zero(near, near + 0.3, steep, steep)
+    assert (found != 0).all()
+    assert (np.abs(found - near) <= (near == 0)).all()
+    others = [np.where(near == 0, side, near) for side in (1, -1)]
+    if (near == 0).sum() == 1 and any((np.abs(np.diff(other)) <= most).all() for other in others):
+        assert (np.abs(np.diff(found)) <= most).all()
