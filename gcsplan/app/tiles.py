@@ -17,6 +17,9 @@ from gcsplan.world.terrain.cell import Cell, cell_of
 
 __all__ = ["tiles_of"]
 
+MOST_RADIUS_KM = 1000.0
+"""Largest radius around a place, km; far fewer tiles are brought at once."""
+
 
 def tiles_of(
     mission: str | os.PathLike[str] | Mapping[str, Any] | None,
@@ -75,6 +78,8 @@ def _around(text: str, radius_km: float) -> Sequence[Cell]:
         place = read_place(text)
     except ValueError as why:
         raise UsageError(f"--around {text[:100]}: give LAT,LON in degrees, such as 36.6,-84.38: {why}") from None
+    if not 0.0 < radius_km <= MOST_RADIUS_KM:
+        raise UsageError(f"--radius-km {radius_km:g}: give more than 0 km, and at most {MOST_RADIUS_KM:g} km")
     reach_m = 1000.0 * radius_km
     try:
         frame = Frame(place.lat_deg, place.lon_deg)

@@ -60,6 +60,7 @@ from gcsplan.mission_file.values.errors import (
     with_lines,
 )
 from gcsplan.mission_file.values.schema import (
+    PLAIN_PLANNER_KEYS,
     TOP_KEYS,
     ArrivalKeys,
     FrameKeys,
@@ -418,8 +419,7 @@ class _MissionReading:
         if keys.name not in known:
             near = nearest(keys.name, known) or f"; known are {', '.join(known)}"
             self.problems.append(Mistake(f"{self.where}planner.name", f"no planner is named {keys.name[:64]!r}{near}"))
-        plain = ("name", "objective", "seed", "gap_percent", "budget_s", "budget_mb")
-        extras = {k: v for k, v in keys.given.items() if k not in plain and v is not None}
+        extras = {k: v for k, v in keys.given.items() if k not in PLAIN_PLANNER_KEYS and v is not None}
         return PlannerRequest(
             keys.name, keys.objective, keys.seed, keys.gap_percent, keys.budget_s, keys.budget_mb, extras
         )

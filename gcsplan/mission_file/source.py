@@ -11,13 +11,14 @@ from __future__ import annotations
 import datetime
 import os
 import shlex
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
 from gcsplan.errors import PATH_KINDS, InputError, UsageError, require_kind, wrong_argument
 from gcsplan.mission_file.memory_files import copied, with_rasters, with_zones
-from gcsplan.mission_file.values.schema import nearest, shown, text_keys
+from gcsplan.mission_file.values.errors import read_section, unknown_keys
+from gcsplan.mission_file.values.schema import PLAIN_PLANNER_KEYS, PlannerKeys, nearest, shown, text_keys
 from gcsplan.mission_file.values.yaml import (
     MAX_YAML_BYTES,
     MAX_YAML_DEPTH,
@@ -203,6 +204,25 @@ class _Plain:
         raise InputError(
             f"a value is text, a number, true, false, a list or a mapping, given {type(value).__name__}", where=where
         )
+
+
+def planner_options(given: Mapping[Any, object], others: Collection[str] | None) -> dict[str, object]:
+    """A script's options of a planner, as the keys of a mission file's ``planner`` are read, so that none has another
+    limit. ``others`` are keys that only this planner has (None: it takes any); they stay as they are.
+
+    Raises UsageError with all mistakes.
+    """
+    for key in given:
+        if not isinstance(key, str):
+            raise wrong_argument("options", "a key", key, "text, such as 'points'")
+    single = [key for key in PlannerKeys.model_fields if key not in PLAIN_PLANNER_KEYS]
+    mine = {key: value for key, value in given.items() if key not in single and (others is None or key in others)}
+    plain = _Plain({}).of({"options": {k: v for k, v in given.items() if k not in mine}}, "planner", 0)["options"]
+    problems = unknown_keys(plain, single, "options")
+    keys = read_section(PlannerKeys, {k: v for k, v in plain.items() if k in single}, "options", problems)
+    if problems:
+        raise UsageError.of(problems)
+    return {**mine, **({} if keys is None else keys.given)}
 
 
 VEHICLES, ZONES, TERRAIN, LOG = "vehicles", "zones", "terrain", "log"

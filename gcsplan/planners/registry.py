@@ -36,6 +36,7 @@ class PlannerEntry:
 
     ``paper`` is its source, empty if it is gcsplan's own. ``defaults`` are fields of `Problem`, or keys of
     ``Problem.options``. ``warm_starts``: it takes the option ``warm_start``, a vehicle whose path is planned before.
+    ``options``: keys of ``Problem.options`` that a script may give, and no mission file.
     """
 
     name: str
@@ -44,6 +45,7 @@ class PlannerEntry:
     paper: str = ""
     defaults: Mapping[str, object] = field(default_factory=lambda: MappingProxyType({}))
     warm_starts: bool = False
+    options: tuple[str, ...] = ()
 
     def plan(self, problem: Problem) -> Solution:
         """A safe path for ``problem``. Raises NoMission if none exists or none was found."""

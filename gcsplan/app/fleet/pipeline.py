@@ -25,6 +25,7 @@ from gcsplan.app.plan.model import Brief, Plan, PlanOptions, VehiclePlan
 from gcsplan.arrays import Floats
 from gcsplan.errors import InputError, NoMission, elements, unknown_name, wrong_argument
 from gcsplan.mission_file import MissionFile, load_mission
+from gcsplan.mission_file.source import planner_options
 from gcsplan.mission_file.values.schema import MOST_SEED
 from gcsplan.planners.problem import UNIT_OF, Problem, Progress, Solution
 from gcsplan.planners.registry import VOLUME_KEYS, AddedEntry
@@ -137,7 +138,8 @@ def _brief_of(source: MissionFile, given: PlanOptions, world: World) -> Brief:
     goal = given.objective or source.planner.objective
     if goal not in UNIT_OF:
         raise wrong_argument("plan()", "objective", goal, "'length', 'energy' or 'time'")
-    merged = _options(source, name) | dict(given.options)
+    others = None if isinstance(entry, AddedEntry) else entry.options
+    merged = _options(source, name) | planner_options(given.options, others)
     if entry.warm_starts:
         _require_warm_start(source, merged)
     number = source.planner.seed if given.seed is None else given.seed

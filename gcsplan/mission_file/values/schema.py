@@ -472,6 +472,10 @@ class PlannerKeys(Keys):
     """A swarm's own parameters, by name."""
 
 
+PLAIN_PLANNER_KEYS = ("name", "objective", "seed", "gap_percent", "budget_s", "budget_mb")
+"""Keys of ``planner:`` that count for every planner."""
+
+
 class MissionKeys(Keys):
     """The whole file. Each of its sections is read separately."""
 

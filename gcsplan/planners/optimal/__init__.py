@@ -14,4 +14,5 @@ def entry(name: str) -> PlannerEntry:
         summary="exact shortest tracks under altitude caps, taut-string profiles, and a bound that no path can beat",
         module="gcsplan.planners.optimal.planner",
         defaults=MappingProxyType({"gap_percent": 0.1, "budget_s": 10.0}),
+        options=("without",),
     )

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
+import numpy as np
 import pytest
 
 import gcsplan
@@ -42,3 +44,41 @@ def test_a_plan_is_a_plan(function: str) -> None:
     arguments: tuple[Any, ...] = (5, "folder") if function == "write" else (5,)
     with pytest.raises(UsageError, match=rf"{function}\(\).* is .*plan.*; given int 5"):
         getattr(gcsplan, function)(*arguments)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"points": math.nan}, r"options\.points.*given nan"),
+        ({"iterations": 10**12}, r"options\.iterations.*10 ?000 ?000"),
+        ({"population": True}, r"options\.population"),
+        ({"encoding": "bokx"}, r"options\.encoding.*bspline"),
+        ({"parameters": {"c1": math.inf}}, r"options\.parameters.*c1"),
+        ({"point": 3}, r"options\.point.*points"),
+        ({"earlier": ()}, r"options\.earlier"),
+        ({3: 4}, r"a key is text.*given int 3"),
+    ],
+)
+def test_options_of_a_script_have_the_limits_of_the_mission_file(options: Any, words: str) -> None:
+    with pytest.raises(UsageError, match=words):
+        gcsplan.plan(DATA / "crossing.yaml", planner="pso", options=options)
+    with pytest.raises(UsageError, match=words):
+        gcsplan.Planner(DATA / "crossing.yaml", planner="pso", options=options).plan()
+
+
+def test_options_may_be_numpys_and_a_script_s_own_planner_takes_any() -> None:
+    given: list[Any] = []
+
+    def seen(problem: gcsplan.Problem) -> gcsplan.Solution:
+        given.append(dict(problem.options))
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        gcsplan.plan(DATA / "crossing.yaml", planner=seen, options={"points": np.int64(3), "mine": seen})
+    assert given == [{"points": 3, "mine": seen}]
+
+
+@pytest.mark.parametrize("radius_km", [math.nan, math.inf, -1.0, 0, 10**12])
+def test_a_radius_of_terrain_is_positive_and_bounded(radius_km: float) -> None:
+    with pytest.raises(UsageError, match="--radius-km"):
+        gcsplan.fetch_dem(around="36.6, -84.3", radius_km=radius_km, offline=True)
