@@ -53,6 +53,9 @@ MissionSource = MissionFile | str | os.PathLike[str] | Mapping[str, Any]
 
 ZONE_LISTS = ("no_fly", "keep_in")
 
+MOST_WORLDS = 2
+"""Most worlds that are kept: the mission's, and that of the drafts of one vehicle alone."""
+
 AT_PLACE_M = 0.05
 """A way point of a path that lies so near to an end or a via is at that place, m."""
 
@@ -135,7 +138,7 @@ class Planner:
         # Lines of a text would be those before its changes.
         self._content: Content = replace(source.content, text=None)
         self._kept, self._paths = KeptWorld(), KeptPaths()
-        self._worlds: Latest[World] = Latest(1)
+        self._worlds: Latest[World] = Latest(MOST_WORLDS)
         self._tracks: dict[str, Floats] = {}  # the last path of each vehicle: (N, 3) lat, lon, AMSL of its way points
         self._planning, self._state = threading.RLock(), threading.Lock()
         self._cancels = 0
@@ -264,7 +267,7 @@ class Planner:
     def reload(self) -> None:
         """Forget what is kept of files, so that the next plan reads them as they are then."""
         with self._planning:
-            self._kept, self._paths, self._worlds = KeptWorld(), KeptPaths(), Latest(1)
+            self._kept, self._paths, self._worlds = KeptWorld(), KeptPaths(), Latest(MOST_WORLDS)
             self._tracks.clear()
 
 

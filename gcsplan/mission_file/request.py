@@ -51,7 +51,7 @@ class ArrivalRequest:
     gates: int | GatePlaces | Literal["auto"] | None = None
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class VehicleRequest:
     """The request for one vehicle.
 

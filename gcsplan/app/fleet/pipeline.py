@@ -114,13 +114,15 @@ def plan_again(
     progress: Callable[[str, Progress], None] | None = None,
     known: Mapping[str, Floats] | None = None,
 ) -> Plan:
-    """`plan` for a session, which searches no path anew where only the arrival differs from what is ``kept``, and tries
-    the ``known`` tracks of vehicles first (`Problem.known`)."""
+    """`plan` for a session, which searches anew only vehicles that differ from what is ``kept``, and tries the
+    ``known`` tracks of vehicles first (`Problem.known`)."""
     brief, leaving = replace(_brief_of(source, given, world), known=known or {}), _leaving(source, given.leave_out)
-    vehicles = kept.get(brief, leaving)
-    if vehicles is None:
-        vehicles = _planned(brief, progress, 1, None, leaving)
-        kept.put(brief, vehicles, leaving)
+    plans, left_out = kept.get(brief, allowed=leaving.allowed)
+    leaving.found += left_out
+    try:
+        vehicles = _one_by_one(brief, progress, leaving, plans)
+    finally:  # a plan that is cancelled leaves what it has found to the next one
+        kept.put(brief, list(plans.values()), leaving.found)
     return finished(brief, vehicles, progress, leaving)
 
 
@@ -176,17 +178,22 @@ def _planned(
 
 
 def _one_by_one(
-    brief: Brief, progress: Callable[[str, Progress], None] | None, leaving: LeavingOut
-) -> list[VehiclePlan]:
+    brief: Brief, progress: Callable[[str, Progress], None] | None, leaving: LeavingOut,
+    plans: dict[str, VehiclePlan] | None = None,
+) -> list[VehiclePlan]:  # fmt: skip
     """Every vehicle's own plan, in the file's order. By priority (MSFOA), each knows the paths before it; otherwise the
-    vehicle around whose path the others begin is planned first."""
+    vehicle around whose path the others begin is planned first. ``plans`` are known by the vehicles' names, and get
+    each one that is found; vehicles that ``leaving`` has left out already are not tried."""
     requests = {r.vehicle.name: r for r in brief.source.vehicles}
     arrival, leader = brief.source.arrival, _leader(brief)
-    plans: dict[str, VehiclePlan] = {}
+    plans = {} if plans is None else plans
+    done = {*plans, *(left.name for left in leaving.found)}
     order = list(arrival.order if brief.by_priority and arrival is not None else requests)
     if leader is not None and not brief.by_priority:
         order.sort(key=lambda name: name != leader)
     for name in order:
+        if name in done:
+            continue
         request = requests[name]
         report = None if progress is None else lambda what, who=name: progress(who, what)
         more: dict[str, object] = {}

@@ -10,7 +10,8 @@ from gcsplan.app.fleet.kept_paths import KeptPaths
 from gcsplan.app.fleet.pipeline import plan_again
 from gcsplan.app.parallel.sites import world_of
 from gcsplan.app.plan.model import PlanOptions
-from gcsplan.app.session import Planner
+from gcsplan.app.session import BetterPath, Planner
+from gcsplan.errors import Cancelled
 from gcsplan.mission_file import load_mission
 from tests.export.test_output_schema import FLAT
 
@@ -61,3 +62,31 @@ def test_a_vehicle_alone_is_planned_without_a_time_table() -> None:
     only = session.plan(alone="b")
     assert [v.name for v in only.vehicles] == ["b"]
     assert [v.name for v in session.plan().vehicles] == ["a", "b"]
+
+
+def test_a_moved_start_is_planned_alone_and_a_cancelled_plan_leaves_what_it_found() -> None:
+    def flown(name: str, sysid: int, north_m: int, east_m: int = 700) -> dict[str, Any]:
+        ends = {"start": {"east_m": 0, "north_m": north_m}, "goal": {"east_m": east_m, "north_m": north_m}}
+        return PAIR["vehicles"][0] | {"name": name, "sysid": sysid, **ends}
+
+    inner = [flown("v3", 3, 270, 600), flown("v4", 4, 360, 600)]
+    outer = flown("c", 9, 500)  # the window stays, for the outer ones stay
+    session = Planner(PAIR | {"vehicles": [*PAIR["vehicles"], *inner, outer]})
+    heard: list[str] = []
+
+    def hear(better: BetterPath) -> None:
+        heard.append(better.vehicle)
+        if better.vehicle == "v4" and len(set(heard)) == 4:
+            session.cancel()
+
+    with pytest.raises(Cancelled):
+        session.plan(on_path=hear)
+    heard.clear()
+    session.plan(on_path=lambda better: heard.append(better.vehicle))
+    assert not {"a", "b", "v3"} & set(heard)
+    heard.clear()
+    session.change({"vehicles.v3.start": {"east_m": 20, "north_m": 280}})
+    again = session.plan(on_path=lambda better: heard.append(better.vehicle))
+    assert set(heard) == {"v3"}
+    anew = Planner(session.mission).plan()
+    assert [v.mission.wire_items() for v in again.vehicles] == [v.mission.wire_items() for v in anew.vehicles]
