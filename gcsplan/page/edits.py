@@ -70,6 +70,7 @@ class Edits:
         edits._saved = edits._state
         if not sample:
             edits._restore(edits.store.kept())
+        edits._history = EditHistory.kept(edits.store.place, edits._state) or edits._history
         return edits
 
     @classmethod
@@ -81,6 +82,7 @@ class Edits:
             with suppress(InputError):
                 edits.planner = Planner(load_mission(edits.store.place, text=edits.store.text))
                 edits._restore(kept)
+                edits._history = EditHistory.kept(edits.store.place, edits._state) or edits._history
         return edits
 
     @property
@@ -244,7 +246,11 @@ class Edits:
         return file
 
     def keep(self) -> bool:
-        """Keep unsaved edits beside the mission; whether there are any. Raises InputError."""
+        """Keep unsaved edits beside the mission, and the steps of undo; whether there are unsaved edits.
+
+        Raises InputError."""
+        if self.planner is not None:
+            self._history.keep(self.store.place, self._state)
         if self.is_saved:
             self.store.forget()
             return False

@@ -243,7 +243,7 @@ class MapSession:
         elif kind == "save":
             file = edits.save(message.get("name"), over=message.get("over") is True)
             self._disk = edits.store.disk()
-            self._unkept = False
+            self._unkept = True  # the steps of undo are those of another text now
             self._send({"type": "saved", "n": self._n, "file": file.name})
             self._send_state()
             return False

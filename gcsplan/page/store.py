@@ -6,20 +6,19 @@ their own, so that the end of the server, however it comes, loses none that is o
 
 from __future__ import annotations
 
-import datetime
 import hashlib
 import json
 import re
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 from gcsplan.errors import GcsplanError, InputError
 from gcsplan.export.durable import write_whole
 from gcsplan.mission_file.changes import saved_text
 from gcsplan.mission_file.source import read_content
 from gcsplan.mission_file.values.yaml import MAX_YAML_BYTES
-from gcsplan.page.history import EditedDocument
+from gcsplan.page.history import EditedDocument, plain_date
 from gcsplan.page.refused import PageError
 
 Disk = Literal["same", "changed", "gone"]
@@ -116,7 +115,7 @@ class MissionStore:
         """Keep unsaved edits beside the mission. Raises InputError."""
         self._kept = True
         kept = {"of_sha256": self._sha256, "mission": document, "text": self.text}
-        write_whole(self.edits, json.dumps(kept, default=_plain))
+        write_whole(self.edits, json.dumps(kept, default=plain_date))
 
     def forget(self) -> None:
         """Remove the file of edits that was kept."""
@@ -168,9 +167,3 @@ def _sha256(file: Path) -> str:
             return hashlib.sha256(opened.read(MAX_YAML_BYTES + 1)).hexdigest()
     except OSError:
         return ""
-
-
-def _plain(value: Any) -> str:
-    if isinstance(value, datetime.date):
-        return value.isoformat()
-    raise TypeError(f"{type(value).__name__} is no value of a mission")

@@ -18,6 +18,7 @@ pytest.importorskip("websockets", reason="the extra map is not installed")
 from gcsplan.app.api import write
 from gcsplan.app.session import Planner
 from gcsplan.cli.command_table import app
+from gcsplan.page.edits import Edits
 from gcsplan.page.server import MapServer
 from tests.page.browser_drag import dragged, table
 from tests.page.browser_hand import IN_A_BROWSER, Hand
@@ -269,6 +270,12 @@ def test_an_open_page_goes_on_with_the_next_server_and_tells_no_other_its_token(
         hand.drag([hand.at(GOAL), (hand.at(GOAL)[0] - 40, hand.at(GOAL)[1])])
         hand.until("!document.getElementById('undo').disabled")
         moved = value(page, "#place-0-goal")
+        hand.judged()
+        hand.until("!document.getElementById('fly-upload').disabled")
+        page.evaluate("document.getElementById('fly-sim').click()")
+        page.evaluate("document.getElementById('fly-connect').click()")
+        hand.until("document.querySelector('.mark.live')")
+        eventually(lambda: Edits.of_file(field).can_undo)  # kept within a second
     hand.until("document.querySelector('.banner')?.innerText.includes('connection')")
     with socket.create_server(("127.0.0.1", address.port)) as stranger:
         stranger.settimeout(20.0)
@@ -285,6 +292,10 @@ def test_an_open_page_goes_on_with_the_next_server_and_tells_no_other_its_token(
         hand.until("!document.querySelector('.banner.bad')")
         hand.judged()
         assert value(page, "#place-0-goal") == moved  # the edits that were not saved
+        hand.until("document.getElementById('fly-said').innerText.includes('Connected again to sim')")
+        hand.until("document.querySelector('.mark.live')")
+        assert page.evaluate("document.getElementById('fly-connect').textContent") == "Disconnect"
+        assert not page.evaluate("document.getElementById('undo').disabled")
         page.visit(server.url)  # a reload
         hand.judged()
     assert value(page, "#place-0-goal") == moved

@@ -240,6 +240,27 @@ def test_edits_that_are_not_saved_are_found_again(file: Path) -> None:
 
 
 @pytest.mark.slow
+def test_steps_of_undo_survive_a_new_start_and_not_another_state_of_the_file(file: Path) -> None:
+    goals = [[46.51, 8.51], [46.515, 8.51], [46.512, 8.51]]
+    with desk_of(file, file.parent) as desk:
+        for goal in goals[1:]:
+            desk.ask("change", "plan", changes={GOAL: goal})
+        desk.ask("save", "saved")
+        desk.ask("undo", "plan")
+    with desk_of(file, file.parent) as desk:
+        state = desk.ask("hello", "state")
+        assert (state["vehicles"][0]["goal"], state["undo"], state["redo"]) == (goals[1], True, True)
+        assert desk.ask("redo", "state")["vehicles"][0]["goal"] == goals[2]
+        desk.ask("undo", "state")
+        assert desk.ask("undo", "state")["vehicles"][0]["goal"] == goals[0]
+        assert desk.ask("redo", "state")["redo"]
+        desk.ask("redo", "plan")  # as saved
+    file.write_text(file.read_text().replace("field", "other"))
+    with desk_of(file, file.parent) as desk:
+        assert not desk.ask("hello", "state")["undo"]
+
+
+@pytest.mark.slow
 def test_edits_of_another_state_of_the_file_are_not_written_over_it(file: Path) -> None:
     session = MapSession(Edits.of_file(file), METRIC, PageSteps)
     desk = Desk(session)

@@ -7,9 +7,9 @@ import { enter, leave } from './modes.js';
 import { drawOnBoard, drawVehicles } from './vehicles.js';
 import { startUpload, upload } from './upload.js';
 
-const KEPT = 'gcsplan-link', NEAR = 15;
+const KEPT = 'gcsplan-link', LISTENED = 'gcsplan-connected', NEAR = 15;
 const OF_A_PLAN = ['fly-board', 'fly-upload', 'fly-write', 'fly-brief'];
-let box = null, ready = false, before = false, online = false, connected = '', asked = 0;
+let box = null, ready = false, before = false, online = false, connected = '', asked = 0, greeted = false, again = '';
 
 export function startFly() {
   const to = el('input', {
@@ -29,21 +29,23 @@ export function startFly() {
     el('p', { class: 'note', id: 'fly-said', role: 'status' }), el('ul', { class: 'list', id: 'fly-live' }));
   on('state', (state) => {
     box.hidden = false;
+    if (state.stage !== 'mission') listenAgain();
     for (const id of [...OF_A_PLAN, 'fly-sim']) box.querySelector(`#${id}`).hidden = state.stage !== 'mission';
     box.querySelector('h2').textContent = state.stage === 'mission' ? 'Fly' : 'Vehicles that are there';
     box.querySelector('#fly-help').textContent = state.stage === 'mission' ? 'Where the vehicles are: a link for all, NAME=LINK for one, or sim.' : 'A link such as udpin:0.0.0.0:14550. Connect only listens; Start here begins the mission where a vehicle stands.';
   });
   for (const kind of ['asked', 'dragged', 'refused']) on(kind, () => { before = ready; enable(false); });
-  on('plan', () => enable(true));
+  on('plan', () => { enable(true); listenAgain(); });
   on('error', (message) => {
     if (message.code === 'bad_change') enable(before);
     if (message.where === 'to') problem(message.message);
   });
   on('connection', (now) => {
     online = now === 'open';
+    greeted = false;
     if (online) names(); else { enable(false); drawVehicles([]); }
   });
-  on('steps', (message) => { connected = message.where; if (!connected) live([]); names(); });
+  on('steps', steps);
   on('live', (message) => live(connected ? message.vehicles : []));
   on('on_board', onBoard);
   on('written', written);
@@ -89,6 +91,24 @@ function connect() {
   if (connected) { send({ type: 'disconnect' }); return; }
   const to = link();
   if (to) send({ type: 'connect', to });
+}
+
+// A new server listens to nobody: what this page was connected to is connected again, and nothing else. Simulated vehicles
+// stand where a plan begins, so it waits for the plan if there is a mission.
+function steps(message) {
+  connected = message.where;
+  again = greeted || connected ? '' : sessionStorage.getItem(LISTENED) || '';
+  greeted = true;
+  if (!again) sessionStorage.setItem(LISTENED, connected);
+  if (!connected) live([]);
+  names();
+}
+
+function listenAgain() {
+  const to = again;
+  again = '';
+  if (!to || connected || !send({ type: 'connect', to })) return;
+  said(`Connected again to ${to}: it only listens, and nothing was sent.`);
 }
 
 function ask(type, needsLink = true) {
