@@ -165,7 +165,13 @@ def fleet_of(
     leaving = leaving or LeavingOut(allowed=False)
     arrival = brief.source.arrival
     if arrival is not None and gate is None and arrival.gates not in (None, "auto"):
-        raise InputError("gates open at times of the day: give the common start (--gate-utc)", where=WHERE)
+        gate = GateTime.stated(brief.source)
+        if gate is None:
+            raise InputError(
+                "gates open at times of the day: give the common start as the mission's `at` "
+                "(2026-11-21T18:30:00Z), or as --gate-utc",
+                where=WHERE,
+            )
     at_start = gate if arrival is None or arrival.gates is None else None  # else they wait on the way, or nowhere
     if arrival is None or len(vehicles) < 2 or not any(drifts(v) for v in vehicles):
         gates = None if arrival is None else next(counts(arrival.gates))

@@ -16,6 +16,8 @@ from datetime import UTC, datetime, timedelta
 from gcsplan.errors import InputError, UsageError
 from gcsplan.fleet.arrival import Crew, Slot
 from gcsplan.fleet.motion.timing import Course
+from gcsplan.mission_file.published.times import begins_with_day
+from gcsplan.mission_file.request import MissionFile
 from gcsplan.vehicle import Autopilot
 
 NEAREST_S = 60.0
@@ -30,6 +32,23 @@ class GateTime:
     """The common start, T+0, in whole seconds UTC."""
 
     start: datetime
+    where: str = "--gate-utc"
+
+    @classmethod
+    def stated(cls, source: MissionFile) -> GateTime | None:
+        """The common start that a mission states: the time of day with which its ``at`` begins; None without one."""
+        content = source.content
+        if source.departure is None or content is None:
+            return None
+        if content.departure is None and begins_with_day(content.at or content.given.get("at")):
+            return None
+        return cls(source.departure.astimezone(UTC).replace(microsecond=0), "at")
+
+    @classmethod
+    def require_of(cls, start_utc: datetime | None) -> None:
+        """Raise UsageError unless the common start of a plan, if it has one, is ahead now: before it is handed out."""
+        if start_utc is not None:
+            cls(start_utc, "the common start").require_ahead(datetime.now(UTC))
 
     @classmethod
     def parse(cls, text: str, now: datetime) -> GateTime:
@@ -62,13 +81,13 @@ class GateTime:
             raise UsageError(
                 f"the start {what} ({at}): it must be {NEAREST_S:g} s ahead at least, for a vehicle that misses its "
                 f"gate waits for nearly a day; give a later time, with its date if it is tomorrow's",
-                where="--gate-utc",
+                where=self.where,
             )
         if ahead_s > FARTHEST_S:
             raise UsageError(
                 f"the start is too far away ({at}): a gate holds no date and would open a day early; "
                 f"give a time {FARTHEST_S / 3600:g} hours ahead at most",
-                where="--gate-utc",
+                where=self.where,
             )
 
     def of_day(self, after_s: int) -> tuple[int, int, int]:

@@ -56,11 +56,10 @@ from gcsplan.cli.process.exit import complain, emit, talking
 from gcsplan.errors import CheckFailed, InputError, NoMission, UsageError
 
 if TYPE_CHECKING:
-    from gcsplan.app.fleet.start_time import GateTime
     from gcsplan.app.output.handout import Handout
     from gcsplan.app.plan.earlier import EarlierMission
     from gcsplan.app.plan.model import Plan
-    from gcsplan.app.upload.job import JobResult, UploadJob
+    from gcsplan.app.upload.job import JobResult
     from gcsplan.mission_file import MissionFile
     from gcsplan.mission_file.changes import MissionChange
     from gcsplan.notes.note import Note
@@ -265,13 +264,13 @@ def plan(
     results: list[JobResult] = []
     if targets:
         results = _upload(
-            handed.jobs, gate, allow_armed=allow_armed, ignore_position=ignore_position, atomic=atomic,
+            handed, allow_armed=allow_armed, ignore_position=ignore_position, atomic=atomic,
             allow_parameters=allow_parameters, timeout_s=timeout,
         )  # fmt: skip
         _add_results(directory, handed, results, system if report else None)
         if not as_json:
             upload_table(results, units=system)
-            release_table(planned, results, gate)
+            release_table(planned, results)
     left_out = _left_out(planned, mission)
     failure = (uploads.failure(results) if targets else None) or left_out
     if as_json:
@@ -502,15 +501,16 @@ def _pictures(planned: Plan, png: Path, each: bool) -> dict[Path, bytes]:
     return {png: outputs.picture_of(planned, png.suffix.lower()[1:])}
 
 
-def _upload(jobs: Sequence[UploadJob], gate: GateTime | None, **options: Any) -> list[JobResult]:
+def _upload(handed: Handout, **options: Any) -> list[JobResult]:
     """Upload all jobs with their progress shown; ``options`` are those of `UploadOptions`."""
+    from gcsplan.app.fleet.start_time import GateTime
     from gcsplan.app.upload import run as uploads
     from gcsplan.app.upload.job import UploadOptions
     from gcsplan.cli.output.console import transfer_progress
     from gcsplan.sim.vehicle.server import loopback_fleet
 
-    if gate is not None:
-        gate.require_ahead(datetime.now(UTC))  # planning took time, so check again
+    fleet, jobs = handed.plan.fleet, handed.jobs
+    GateTime.require_of(None if fleet is None else fleet.start_utc)  # planning took time, so check again
     names = [job.name for job in jobs]
     with talking(names), transfer_progress(names) as moved_on:
         return uploads.run_jobs(jobs, UploadOptions(**options), moved_on, simulator=loopback_fleet)

@@ -24,7 +24,6 @@ from gcsplan.units import KILOJOULE, METRIC, WATT_HOUR, Unit, Units, charge, dur
 from gcsplan.world.terrain.model_words import heights_line, notes_on, what_is_not_in
 
 if TYPE_CHECKING:
-    from gcsplan.app.fleet.start_time import GateTime
     from gcsplan.app.plan.model import FleetPlan, Plan, VehiclePlan
     from gcsplan.app.upload.job import JobResult
     from gcsplan.check.returns.verdict import WayHome
@@ -294,7 +293,7 @@ def upload_table(results: Sequence[JobResult], title: str = "upload", units: Uni
             aside.print(f"{d.vehicle}: {d.message}", style="red", markup=False)
 
 
-def release_table(plan: Plan, results: Sequence[JobResult], gate: GateTime | None = None) -> None:
+def release_table(plan: Plan, results: Sequence[JobResult]) -> None:
     """Print when to start each vehicle of a fleet by hand: nothing is armed or started here."""
     from gcsplan.app.upload.job import releases  # after an upload alone: what sends takes long to import
 
@@ -309,8 +308,8 @@ def release_table(plan: Plan, results: Sequence[JobResult], gate: GateTime | Non
         window = [span(within, 1)] if windy else []
         table.add_row(escape(slot.name), duration(slot.depart_s, 1), duration(slot.arrive_s, 1), *window, state)
     print_table(table)
-    if gate is not None:
-        say(f"T+0 is {gate.start:%Y-%m-%d %H:%M:%S} UTC")
+    if plan.fleet is not None and plan.fleet.start_utc is not None:
+        say(f"T+0 is {plan.fleet.start_utc:%Y-%m-%d %H:%M:%S} UTC")
 
 
 def say_notes(notes: Iterable[Note], wording: Wording = IN_FILES) -> None:

@@ -67,7 +67,6 @@ class _Ticket:
     options: UploadOptions
     until_s: float
     page: int
-    gate: GateTime | None
 
 
 class PageSteps:
@@ -226,7 +225,7 @@ class PageSteps:
         may_go = any(v["found"] and not v["against"] for v in vehicles)
         ticket = secrets.token_urlsafe(TICKET_BYTES) if may_go and page == self._page else ""
         if ticket:
-            self._ticket = _Ticket(ticket, shown, handed, options, time.monotonic() + TICKET_S, page, gate)
+            self._ticket = _Ticket(ticket, shown, handed, options, time.monotonic() + TICKET_S, page)
         wording = Wording(self._units())
         notes = [f"{name}: {note.text(wording)}" for name, note in handed.notes]
         notes += [f"{left.name} is left out: {left.message}" for left in handed.plan.left_out]
@@ -251,8 +250,8 @@ class PageSteps:
     def _sent(self, n: int, ticket: _Ticket) -> PageMessage:
         handed, names = ticket.handed, [job.name for job in ticket.handed.jobs]
         folder = ticket.shown.folder
-        if ticket.gate is not None:
-            ticket.gate.require_ahead(datetime.now(UTC))
+        fleet = handed.plan.fleet
+        GateTime.require_of(None if fleet is None else fleet.start_utc)
         self._send(self._written(n, folder, handed))
         progress = _Progress(n, self._send)
         try:

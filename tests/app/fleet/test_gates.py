@@ -9,11 +9,11 @@ from typing import Any
 
 import pytest
 
-from gcsplan import Plan, plan
+from gcsplan import Plan, plan, upload
 from gcsplan.app.output.files import summary_of
 from gcsplan.app.rehearse import rehearse, weather_of
 from gcsplan.check.judge import judge
-from gcsplan.errors import InputError, NoMission
+from gcsplan.errors import InputError, NoMission, UsageError
 from gcsplan.mavlink.mission import commands as cmd
 from tests.app.fleet.test_every_wind import (
     SEPARATION_M,
@@ -49,6 +49,20 @@ def lane(gates: Any, wind: dict[str, Any] | None = None, count: int = 1, **more:
 
 def planned(*args: Any, **more: Any) -> Plan:
     return plan(lane(*args, **more), gate_utc=START)
+
+
+@pytest.mark.slow
+def test_the_common_start_may_be_the_missions_own_time_of_day_but_no_day() -> None:
+    mission = lane([{"east_m": 700, "north_m": 30}])
+    stated = plan(mission | {"at": f"{START:%Y-%m-%dT%H:%M:%SZ}"})
+    [one], [other] = stated.vehicles, plan(mission, gate_utc=START).vehicles
+    assert one.mission.wire_items() == other.mission.wire_items()
+    assert stated.fleet is not None
+    assert stated.fleet.start_utc == START
+    with pytest.raises(UsageError, match="the common start: the start is past"):  # whoever planned it, and how
+        upload(stated, to="sim")
+    with pytest.raises(InputError, match=r"arrival.gates: .*give the common start as the mission's `at`"):
+        plan(mission | {"at": f"{START:%Y-%m-%d}"})
 
 
 @pytest.mark.slow
