@@ -42,7 +42,7 @@ from gcsplan.page.edits import Edits
 from gcsplan.page.ground_tiles import bounds_of
 from gcsplan.page.places import vehicles_of
 from gcsplan.page.refused import PageError
-from gcsplan.page.zone_features import zones_geojson
+from gcsplan.page.zone_features import DrawnZones
 from gcsplan.report.parts.track_samples import TrackLine, line_of
 from gcsplan.units import METRIC, Units
 from gcsplan.vehicle import Autopilot
@@ -196,7 +196,7 @@ class DroppedFile:
     def _zones(self, dropped: Dropped, message: FileMessage, units: Units) -> FileAnswer:
         drafts, notes = self._read(dropped, message)
         name, entry, _ = self._entry(dropped, message)
-        drawn = zones_geojson({name: [entry]}, {f"{name}[0]": drafts[:MOST_DRAWN]}, None, units)
+        drawn = DrawnZones().geojson({name: [entry]}, {f"{name}[0]": drafts[:MOST_DRAWN]}, None, units)
         return {"as": name, "zones": drawn, "count": len(drafts), "notes": _texts(notes, Wording(units))}
 
     def _take_zones(self, dropped: Dropped, message: FileMessage) -> None:

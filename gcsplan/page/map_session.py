@@ -34,7 +34,7 @@ from gcsplan.page.ground_tiles import LEAST_ZOOM, MOST_ZOOM, GroundTiles, contou
 from gcsplan.page.history import EditedDocument
 from gcsplan.page.places import read_text, vehicles_of
 from gcsplan.page.refused import PageError
-from gcsplan.page.zone_features import zones_geojson
+from gcsplan.page.zone_features import DrawnZones
 from gcsplan.units import SYSTEMS, Units
 from gcsplan.world.geodesy.frame import Frame
 
@@ -114,7 +114,7 @@ class MapSession:
         self._homeless: tuple[int, Plan] | None = None  # a plan, with its n, whose way home is to be sent
         self._costs: dict[str, float] = {}
         self._problems: tuple[Mistake, ...] = ()
-        self._zones = KeptWorld()
+        self._zones, self._drawn = KeptWorld(), DrawnZones()
         self._names: list[str] = []
         self._vehicle = 0
         self._last: Plan | None = None
@@ -456,7 +456,7 @@ class MapSession:
             "units": {"name": self._units.name, "systems": list(SYSTEMS), "kinds": self._units.as_dict()},
             "bounds": _bounds_of(vehicles) or (self._tiles.bounds if self._tiles is not None else None),
             "terrain": self._terrain(), "vehicles": vehicles, "vehicle": self._vehicle, "arrival": arrival_of(document),
-            "zones": zones_geojson(document, entries, frame, self._units),
+            "zones": self._drawn.geojson(document, entries, frame, self._units),
             "counts": {key: len(document.get(key) or ()) for key in ("no_fly", "keep_in")},
             "form": short_form(document, self._problems, self._vehicle) if edits.stage == "mission" else [],
             "problems": [{"where": p.key, "message": p.message} for p in self._problems],

@@ -18,28 +18,52 @@ from gcsplan.world.geodesy.frame import Frame
 ZONE_BOUNDS = ("floor", "ceiling")
 
 
-def zones_geojson(
-    document: EditedDocument, entries: Mapping[str, Sequence[ZoneDraft]], frame: Frame | None, units: Units
-) -> dict[str, Any]:
-    """A FeatureCollection: each zone with the key of its entry, and what the page needs to edit it.
+Drawn = tuple[dict[str, Any], str]
+"""The outline of a zone as GeoJSON, and its heights in words."""
 
-    ``entries`` as of `zones_by_entry`; ``frame`` is that of a mission in local metres.
-    """
-    features = []
-    for key, draft in ((key, draft) for key, drafts in entries.items() for draft in drafts):
-        if draft.local and frame is None:
-            continue
-        plane = frame or Frame(*_middle(draft))
-        try:
-            placed, _ = place_zones([replace(draft, keep_in=False, holes=(), unused=None)], plane)
-        except InputError:
-            continue  # its mistake is among the mission's problems
-        zones = [zone for _, zone in placed]
-        rings = outlines_deg(zones, plane)
-        if rings:
-            about = _about(key, entry_of(document, key), draft, zone_heights(zones[0], units))
-            features.append({"type": "Feature", "geometry": area_geometry(rings), "properties": about})
-    return {"type": "FeatureCollection", "features": features}
+
+class DrawnZones:
+    """The zones of one page's mission; a zone that stays the same is not drawn anew for each state."""
+
+    def __init__(self) -> None:
+        self._known: dict[tuple[str, int], tuple[ZoneDraft, tuple[object, ...], Drawn | None]] = {}
+
+    def geojson(
+        self, document: EditedDocument, entries: Mapping[str, Sequence[ZoneDraft]], frame: Frame | None, units: Units
+    ) -> dict[str, Any]:
+        """A FeatureCollection: each zone with the key of its entry, and what the page needs to edit it.
+
+        ``entries`` as of `zones_by_entry`; ``frame`` is that of a mission in local metres.
+        """
+        features = []
+        now: dict[tuple[str, int], tuple[ZoneDraft, tuple[object, ...], Drawn | None]] = {}
+        by = units.name, None if frame is None else (frame.lat_deg, frame.lon_deg)
+        for key, number, draft in (
+            (key, k, draft) for key, drafts in entries.items() for k, draft in enumerate(drafts)
+        ):
+            known = self._known.get((key, number))
+            same = known is not None and known[0] is draft and known[1] == by
+            drawn = known[2] if known is not None and same else _drawn(draft, frame, units)
+            now[key, number] = draft, by, drawn
+            if drawn is not None:
+                about = _about(key, entry_of(document, key), draft, drawn[1])
+                features.append({"type": "Feature", "geometry": drawn[0], "properties": about})
+        self._known = now
+        return {"type": "FeatureCollection", "features": features}
+
+
+def _drawn(draft: ZoneDraft, frame: Frame | None, units: Units) -> Drawn | None:
+    """The zone for the map; None if it cannot be drawn: its mistake is among the mission's problems."""
+    if draft.local and frame is None:
+        return None
+    plane = frame or Frame(*_middle(draft))
+    try:
+        placed, _ = place_zones([replace(draft, keep_in=False, holes=(), unused=None)], plane)
+    except InputError:
+        return None
+    zones = [zone for _, zone in placed]
+    rings = outlines_deg(zones, plane)
+    return (area_geometry(rings), zone_heights(zones[0], units)) if rings else None
 
 
 def _middle(draft: ZoneDraft) -> tuple[float, float]:

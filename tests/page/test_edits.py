@@ -17,7 +17,7 @@ from gcsplan.page.history import MOST_STEPS, EditHistory
 from gcsplan.page.places import place_of, read_text, vehicles_of, with_heights
 from gcsplan.page.refused import PageError
 from gcsplan.page.store import MissionStore
-from gcsplan.page.zone_features import zones_geojson
+from gcsplan.page.zone_features import DrawnZones
 from gcsplan.units import AVIATION, METRIC
 from gcsplan.world.geodesy.frame import Frame
 
@@ -105,7 +105,7 @@ def test_zones_are_drawn_although_others_are_wrong(tmp_path: Path) -> None:
         "keep_in": [{"name": "all", "polygon": [[46, 8], [47, 8], [47, 9]]}],
     }
     entries = zones_by_entry(Content(tmp_path / "m.yaml", "m.yaml", document, None), KeptWorld())
-    features = zones_geojson(document, entries, None, AVIATION)["features"]
+    features = DrawnZones().geojson(document, entries, None, AVIATION)["features"]
     about = {f["properties"]["name"]: f["properties"] for f in features}
     assert set(about) == {"a", "wood", "line", "all"}
     assert (about["a"]["key"], about["a"]["editable"], about["a"]["ceiling"]) == (
@@ -117,13 +117,13 @@ def test_zones_are_drawn_although_others_are_wrong(tmp_path: Path) -> None:
     assert (about["wood"]["key"], about["wood"]["shape"], about["wood"]["editable"]) == ("no_fly[2]", "file", False)
     assert (about["all"]["kind"], about["all"]["editable"]) == ("keep_in", True)
     assert about["line"]["editable"] is False
-    assert zones_geojson({}, {}, None, METRIC)["features"] == []
+    assert DrawnZones().geojson({}, {}, None, METRIC)["features"] == []
 
 
 def test_a_zone_over_the_antimeridian_is_cut_there_for_the_map(tmp_path: Path) -> None:
     document = {"no_fly": [{"name": "atoll", "center": [-17.0, 179.999], "radius_m": 900}]}
     entries = zones_by_entry(Content(tmp_path / "m.yaml", "m.yaml", document, None), KeptWorld())
-    [feature] = zones_geojson(document, entries, None, METRIC)["features"]
+    [feature] = DrawnZones().geojson(document, entries, None, METRIC)["features"]
     assert feature["geometry"]["type"] == "MultiPolygon"
     spans = [np.ptp([lon for lon, _ in outline]) for [outline] in feature["geometry"]["coordinates"]]
     assert len(spans) == 2
