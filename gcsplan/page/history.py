@@ -1,7 +1,7 @@
 """`EditHistory`: the documents of a mission before and after the one in force, for undo and redo.
 
-It is kept in the user's private cache, for the next start of the server. What is read back from there is trusted as the
-machine code beside it: nobody else can have written it.
+It is kept in the user's private cache, for the next start of the server. The kept steps are trusted as the machine
+code beside them is: nobody else can have written them.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ from gcsplan.world.geodesy.frame import Frame
 ZONE_BOUNDS = ("floor", "ceiling")
 
 
-Drawn = tuple[dict[str, Any], str]
+OutlineAndLevels = tuple[dict[str, Any], str]
 """The outline of a zone as GeoJSON, and its heights in words."""
 
 
@@ -26,7 +26,7 @@ class DrawnZones:
     """The zones of one page's mission; a zone that stays the same is not drawn anew for each state."""
 
     def __init__(self) -> None:
-        self._known: dict[tuple[str, int], tuple[ZoneDraft, tuple[object, ...], Drawn | None]] = {}
+        self._known: dict[tuple[str, int], tuple[ZoneDraft, tuple[object, ...], OutlineAndLevels | None]] = {}
 
     def geojson(
         self, document: EditedDocument, entries: Mapping[str, Sequence[ZoneDraft]], frame: Frame | None, units: Units
@@ -36,7 +36,7 @@ class DrawnZones:
         ``entries`` as of `zones_by_entry`; ``frame`` is that of a mission in local metres.
         """
         features = []
-        now: dict[tuple[str, int], tuple[ZoneDraft, tuple[object, ...], Drawn | None]] = {}
+        now: dict[tuple[str, int], tuple[ZoneDraft, tuple[object, ...], OutlineAndLevels | None]] = {}
         by = units.name, None if frame is None else (frame.lat_deg, frame.lon_deg)
         for key, number, draft in (
             (key, k, draft) for key, drafts in entries.items() for k, draft in enumerate(drafts)
@@ -52,7 +52,7 @@ class DrawnZones:
         return {"type": "FeatureCollection", "features": features}
 
 
-def _drawn(draft: ZoneDraft, frame: Frame | None, units: Units) -> Drawn | None:
+def _drawn(draft: ZoneDraft, frame: Frame | None, units: Units) -> OutlineAndLevels | None:
     """The zone for the map; None if it cannot be drawn: its mistake is among the mission's problems."""
     if draft.local and frame is None:
         return None

@@ -67,7 +67,7 @@ def test_a_vehicle_alone_is_planned_without_a_time_table() -> None:
 def test_a_moved_start_is_planned_alone_and_a_cancelled_plan_leaves_what_it_found() -> None:
     def flown(name: str, sysid: int, north_m: int, east_m: int = 700) -> dict[str, Any]:
         ends = {"start": {"east_m": 0, "north_m": north_m}, "goal": {"east_m": east_m, "north_m": north_m}}
-        return PAIR["vehicles"][0] | {"name": name, "sysid": sysid, **ends}
+        return {**PAIR["vehicles"][0], "name": name, "sysid": sysid, **ends}
 
     inner = [flown("v3", 3, 270, 600), flown("v4", 4, 360, 600)]
     outer = flown("c", 9, 500)  # the window stays, for the outer ones stay
