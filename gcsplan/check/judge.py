@@ -305,6 +305,7 @@ def _figures(
     low_en = plane.legs.start[lows, :2] + at[:, None] * (plane.legs.end[lows, :2] - plane.legs.start[lows, :2])
     near, steepest = first(np.argmin, report.zone_clearance_m), first(np.argmax, np.abs(report.climb_deg))
     ends = plane.legs.end[edges[1:] - 1]
+    ways = (ends - plane.legs.start[edges[:-1]])[:, :2].tolist()
     known = ~np.isnan(report.min_agl_m)
     rows = zip(
         flight.stretches, each(np.sum, runs), each(np.sum, np.hypot(runs, rises)), each(np.sum, np.abs(rises)),
@@ -343,6 +344,7 @@ def _figures(
                 lead_j=_lead_j(vehicle, s, float(run_m), worst_s, 0.0 if costs is None else float(costs.wind_m_s[i])),
                 speed_m_s=s.speed_m_s,
                 until_s=s.until_s,
+                way_m=(ways[i][0], ways[i][1]),
             )
         )  # fmt: skip
     return tuple(figures)

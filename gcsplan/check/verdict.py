@@ -36,7 +36,7 @@ class LegFigures:
     often it is flown, if a jump leads back. ``until_s``: its hold ends at a time of day, so many seconds after
     the vehicle has left the ground. ``jumped_from``: the jump that leads to it. ``lead_j``: of ``energy_j``,
     what is at most spent ahead of an even share on the way: the base power while it is slower than its top speed.
-    ``speed_m_s``: commanded.
+    ``speed_m_s``: commanded. ``way_m``: from its start to its end, to east and to north in the mission's plane.
     """
 
     seq: int
@@ -63,6 +63,7 @@ class LegFigures:
     lead_j: float = 0.0
     speed_m_s: float = math.nan
     until_s: float | None = None
+    way_m: tuple[float, float] = (math.nan, math.nan)
 
 
 def by_item(legs: Sequence[LegFigures]) -> Iterator[tuple[LegFigures, int]]:
@@ -96,7 +97,7 @@ def _together(legs: Sequence[LegFigures]) -> LegFigures:
         horizontal_m=total(lambda leg: leg.horizontal_m), length_m=total(lambda leg: leg.length_m),
         energy_j=total(lambda leg: leg.energy_j), time_s=total(lambda leg: leg.time_s),
         hold_s=total(lambda leg: leg.hold_s), hold_j=total(lambda leg: leg.hold_j),
-        lead_j=total(lambda leg: leg.lead_j),
+        lead_j=total(lambda leg: leg.lead_j), way_m=(total(lambda leg: leg.way_m[0]), total(lambda leg: leg.way_m[1])),
         climb_deg=max((leg.climb_deg for leg in flown or legs), key=abs),
         min_agl_m=math.nan if low is None else low.min_agl_m, min_agl_at=(low or last).min_agl_at,
         max_agl_m=max((leg.max_agl_m for leg in legs if not math.isnan(leg.max_agl_m)), default=math.nan),

@@ -198,17 +198,21 @@ class Problem:
     def leg_costs(self, start: Floats, end: Floats) -> Floats:
         """(...) costs of straight legs between points (..., 3); `cost` of a path is their sum."""
         d = end - start
-        return self.slope_costs(np.hypot(d[..., 0], d[..., 1]), d[..., 2], 0.5 * (start[..., 2] + end[..., 2]))
+        middle_m = 0.5 * (start[..., 2] + end[..., 2])
+        return self.slope_costs(np.hypot(d[..., 0], d[..., 1]), d[..., 2], middle_m, d[..., :2])
 
-    def slope_costs(self, run_m: Floats | float, rise_m: Floats | float, amsl_m: Floats | float = 0.0) -> Floats:
+    def slope_costs(
+        self, run_m: Floats | float, rise_m: Floats | float, amsl_m: Floats | float = 0.0, way_m: Floats | None = None
+    ) -> Floats:
         """(...) costs of straight legs by their metres of track and the metres that they rise, below 0 where they
         descend. A leg costs no more than any other way between its ends, because costs grow in proportion to a leg and
-        are convex in both numbers; but for an ``airspeed``, whose legs have their middles at ``amsl_m``."""
+        are convex in both numbers; but for an ``airspeed``, whose legs have their middles at ``amsl_m`` and lead
+        ``way_m`` (..., 2) to east and to north; None: against its wind."""
         if self.objective == "energy":
             return np.asarray(self.horizontal_j_per_m * run_m + self.vertical_j_per_m * np.abs(rise_m))
         if self.objective == "time":
             if self.airspeed is not None:
-                return self.airspeed.leg_s(run_m, rise_m, amsl_m)
+                return self.airspeed.leg_s(run_m, rise_m, amsl_m, way_m)
             rise_s = np.maximum(np.divide(rise_m, self.climb_m_s), np.divide(rise_m, -self.descent_m_s))
             return np.maximum(np.divide(run_m, self.speed_m_s), rise_s)
         return np.asarray(np.hypot(run_m, rise_m))

@@ -66,6 +66,14 @@ class DeclaredWind:
         )
 
     @property
+    def constant_m_s(self) -> tuple[float, float] | None:
+        """The one wind that blows at all heights and hours, to east and to north, m/s; None if another one may blow."""
+        if not self.single or self.speed_m_s.size != 2 or self.gusts_add_m_s:
+            return None
+        east, north = self._levels(np.zeros((1, 2)))[0, 0, 0].tolist()
+        return east, north
+
+    @property
     def most_m_s(self) -> float:
         """The highest speed of the set, without gusts, m/s."""
         return float(self.speed_m_s.max())

@@ -151,7 +151,8 @@ def judge(
 def dearest_metre(p: Problem) -> float:
     """The most that a metre costs."""
     if p.airspeed is not None:
-        return 1.0 / min(p.airspeed.indicated_m_s, p.airspeed.climb_m_s, p.airspeed.descent_m_s)
+        against_m_s = p.airspeed.indicated_m_s - p.airspeed.blows_m_s
+        return 1.0 / min(against_m_s, p.airspeed.climb_m_s, p.airspeed.descent_m_s)
     if p.objective == "time":
         return 1.0 / min(p.speed_m_s, p.climb_m_s, p.descent_m_s)
     return 1.0 if p.objective == "length" else p.vertical_j_per_m + p.horizontal_j_per_m
@@ -166,11 +167,14 @@ def in_time(seed: int) -> dict[str, Any]:
 
 
 def at_airspeed(seed: int) -> dict[str, Any]:
-    """The objective time of a fixed wing, with an airspeed for one seed, and rates that bind it or do not."""
+    """The objective time of a fixed wing, with airspeed and wind for one seed, and rates that bind it or do not."""
     rng = np.random.default_rng([seed, 53])
     fast = float(rng.choice([8.0, 15.0, 30.0]))
     rates = rng.choice([math.inf, 0.3, 0.1], 2, p=[0.6, 0.2, 0.2]) * fast
-    return {"objective": "time", "airspeed": Airspeed(fast, *rates.tolist()), "speed_m_s": 2.0 * fast}
+    blows_m_s, angle = fast * float(rng.choice([0.0, 0.3, 0.6])), float(rng.uniform(0.0, 2.0 * math.pi))
+    wind_m_s = blows_m_s * math.cos(angle), blows_m_s * math.sin(angle)
+    airspeed = Airspeed(fast, float(rates[0]), float(rates[1]), wind_m_s)
+    return {"objective": "time", "airspeed": airspeed, "speed_m_s": 2.6 * fast}
 
 
 def reverse(p: Problem) -> Problem:

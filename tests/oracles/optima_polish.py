@@ -76,9 +76,13 @@ def leg_costs(problem: Problem, a: Floats, b: Floats) -> Floats:
     flat = np.hypot(d[..., 0], d[..., 1])
     if problem.objective == "time" and problem.airspeed is not None:
         fast, rise = problem.airspeed, d[..., 2]
-        times = np.hypot(flat, rise) / fast.indicated_m_s, rise / fast.climb_m_s, -rise / fast.descent_m_s
-        heights = a[..., 2] + np.linspace(0.0, 1.0, 33).reshape(-1, *[1] * rise.ndim) * rise
-        return np.asarray(np.maximum.reduce(times) * (1.0 / thinner(heights)).mean(axis=0))
+        thin = thinner(a[..., 2] + np.linspace(0.0, 1.0, 33).reshape(-1, *[1] * rise.ndim) * rise)
+        # The least time of which the way, less what the wind carries meanwhile, is flown at the airspeed.
+        carried, still = d[..., :2] @ np.array(fast.wind_m_s), np.hypot(flat, rise)
+        spare = (fast.indicated_m_s * thin) ** 2 - math.hypot(*fast.wind_m_s) ** 2
+        along = (np.sqrt(spare * still**2 + carried**2) - carried) / spare
+        rates = np.maximum(rise / fast.climb_m_s, -rise / fast.descent_m_s) / thin
+        return np.asarray(np.maximum(along, rates).mean(axis=0))
     if problem.objective == "time":
         times = flat / problem.speed_m_s, d[..., 2] / problem.climb_m_s, -d[..., 2] / problem.descent_m_s
         return np.asarray(np.maximum.reduce(times))

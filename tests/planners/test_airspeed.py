@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -81,6 +82,49 @@ def test_a_wings_leg_takes_as_long_as_the_model_of_motion_says() -> None:
         way = legs(points, vehicle, np.zeros(1, dtype=np.intp))
         assert way is not None
         assert fast.path_s(points) == pytest.approx(way.time_s(FAST_M_S), rel=2e-4)
+
+
+def flown_s(points: Floats, wind_m_s: tuple[float, float], rates_m_s: tuple[float, float]) -> float:
+    """Seconds of a path in a wind by steps of 1/400 of a leg: each by the angle at which the nose is off the track."""
+    total_s = 0.0
+    for a, b in pairwise(points):
+        way = (b - a) / 400
+        step_m, rise_m = float(np.linalg.norm(way)), float(way[2])
+        tail = float(np.dot(way[:2], wind_m_s)) / step_m
+        aside = math.sqrt(max(math.hypot(*wind_m_s) ** 2 - tail**2, 0.0))
+        for k in range(400):
+            thin = float(thinner(a[2] + (k + 0.5) * rise_m))
+            over_m_s = tail + FAST_M_S * thin * math.cos(math.asin(aside / (FAST_M_S * thin)))
+            total_s += max(step_m / over_m_s, rise_m / rates_m_s[0] / thin, -rise_m / rates_m_s[1] / thin)
+    return total_s
+
+
+@pytest.mark.parametrize("rates_m_s", [(math.inf, math.inf), (2.0, 1.5)])
+def test_no_random_path_in_a_wind_is_faster_than_the_bound(rates_m_s: tuple[float, float]) -> None:
+    rng, near = np.random.default_rng(7), []
+    for k in range(12):
+        blows, angle = float(rng.uniform(0.0, 0.9 * FAST_M_S)), float(rng.uniform(0.0, 2.0 * math.pi))
+        fast = Airspeed(FAST_M_S, *rates_m_s, (blows * math.cos(angle), blows * math.sin(angle)))
+        points = rng.uniform([0.0, 0.0, 0.0], [9000.0, 9000.0, 600.0], (2 + k % 3, 3))
+        d = np.diff(points, axis=0)
+        slopes = np.degrees(np.arctan2(d[:, 2], np.hypot(d[:, 0], d[:, 1])))
+        steep = {"max_climb_deg": max(slopes.max(), 0.1), "max_descent_deg": max(-slopes.min(), 0.1)}
+        ends_m, way_m = (points[0, 2], points[-1, 2]), (d[:, 0].sum(), d[:, 1].sum())
+        length_m, top_m = float(np.linalg.norm(d, axis=1).sum()), float(points[:, 2].max())
+        bound_s = fast.least_s(length_m, ends_m, Limits(0.0, **steep), top_m, 0.0, way_m)
+        took_s = flown_s(points, fast.wind_m_s, rates_m_s)
+        assert fast.path_s(points) == pytest.approx(took_s, rel=1e-4)
+        assert bound_s <= took_s
+        near.append(took_s / bound_s)
+    assert min(near) < 1.02
+
+
+def test_a_level_way_in_a_wind_is_bounded_by_its_own_time() -> None:
+    for wind_m_s in ((0.0, 0.0), (12.0, 5.0), (-15.0, 2.0)):
+        fast, points = Airspeed(FAST_M_S, wind_m_s=wind_m_s), np.array([[0.0, 0.0, 50.0], [3000.0, -4000.0, 50.0]])
+        bound_s = fast.least_s(5000.0, (50.0, 50.0), Limits(0.0, max_climb_deg=8.0), 50.0, 0.0, (3000.0, -4000.0))
+        assert bound_s == pytest.approx(fast.path_s(points), rel=1e-6)
+        assert bound_s == pytest.approx(flown_s(points, wind_m_s, (math.inf, math.inf)), rel=1e-6)
 
 
 def test_a_leg_takes_as_long_as_its_parts() -> None:

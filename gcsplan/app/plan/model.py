@@ -141,7 +141,8 @@ class VehiclePlan:
             legs = self.verdict.path_legs
             amsl_m = np.array([(leg.start[2], leg.end[2]) for leg in legs]).reshape(-1, 2)
             run_m, times = np.array([(leg.horizontal_m, leg.times) for leg in legs]).reshape(-1, 2).T
-            seconds = self.problem.slope_costs(run_m, np.diff(amsl_m)[:, 0], amsl_m.mean(axis=1))
+            way_m = np.array([leg.way_m for leg in legs]).reshape(-1, 2)
+            seconds = self.problem.slope_costs(run_m, np.diff(amsl_m)[:, 0], amsl_m.mean(axis=1), way_m)
             return math.fsum((seconds * times).tolist())
         return self.verdict.path_energy_j if self.problem.objective == "energy" else self.verdict.length_m
 

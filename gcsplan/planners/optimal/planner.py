@@ -99,11 +99,13 @@ def _at_airspeed(problem: Problem, airspeed: Airspeed) -> Solution:
 def _least_s(over: Problem, airspeed: Airspeed, length_m: float) -> float:
     """No path of a fixed wing takes less if none is shorter than ``length_m``; ``over``: the problem for lengths."""
     limits, ends, off_m = over.bound_limits, (over.start[2], over.goal[2]), over.rounding_m[1]
-    within_s = airspeed.least_s(length_m, ends, limits, ceiling_m(over, limits), off_m)
+    way_m = over.goal[0] - over.start[0], over.goal[1] - over.start[1]
+    rest = off_m, way_m, 2.0 * over.rounding_m[0]
+    within_s = airspeed.least_s(length_m, ends, limits, ceiling_m(over, limits), *rest)
     # Beyond the terrain that is loaded the ground may be higher, but that is far.
     beyond = ceiling_m(over, replace(limits, max_agl_m=None))
     far_m = max(length_m, over.rounding().bound(exit_cost(over)))
-    return min(within_s, airspeed.least_s(far_m, ends, limits, beyond, off_m))
+    return min(within_s, airspeed.least_s(far_m, ends, limits, beyond, *rest))
 
 
 def _within(problem: Problem) -> Solution:

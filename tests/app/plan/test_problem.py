@@ -85,9 +85,22 @@ def test_a_wings_fastest_plan_tells_its_time_in_thin_air() -> None:
     assert fast["path_time_s"] <= short["length_m"] / 15.0
 
 
+@pytest.mark.slow
+def test_a_wings_fastest_plan_counts_the_one_declared_wind() -> None:
+    behind, ahead = (
+        summary_of(plan(on_a_hill(WING, "time", wind={"from_deg": side, "speed_m_s": 4})))["vehicles"][0]
+        for side in (270, 90)
+    )
+    for each, over_m_s in ((behind, 19.0), (ahead, 11.0)):
+        assert each["lower_bound_s"] <= each["path_time_s"] < 1.06 * each["lower_bound_s"]
+        assert each["path_time_s"] == pytest.approx(each["length_m"] / over_m_s, rel=0.1)
+
+
 @pytest.mark.parametrize(
     ("vehicle", "keys", "why"),
-    [(WING, {"wind": {"from_deg": 270, "speed_m_s": 3}}, "fixed wing"), ({}, {}, "climb_m_s and descent_m_s"),
+    [(WING, {"wind": {"up_to_m_s": 3}}, "fixed wing"), ({}, {}, "climb_m_s and descent_m_s"),
+     (WING, {"wind": {"from_deg": 270, "speed_m_s": 3, "gust_m_s": 5}}, "fixed wing"),
+     (WING, {"wind": {"from_deg": 270, "speed_m_s": 14.5}}, "about as fast"),
      (RATES, {"altitude_frame": "terrain"}, "altitude_frame terrain")],
 )  # fmt: skip
 def test_a_fastest_path_that_is_not_known_is_refused_with_its_cure(
