@@ -183,7 +183,8 @@ def mission_of(seed: int, number: int, folder: Path) -> tuple[str, dict[str, Any
 def fleet_of(seed: int, number: int, folder: Path) -> tuple[str, dict[str, Any]]:
     """As `mission_of`, of a fleet that arrives in sequence: each flies beside its neighbour, to a goal of its own.
 
-    In every second fleet copters have gates, and cannot give up speed to keep their times.
+    `window_s` is half to twice what the wind makes of the slowest wing's time, so some fleets ask for too much. In
+    every second fleet copters have gates, and cannot give up speed to keep their times.
     """
     rng = np.random.default_rng([seed, number, 1])
     kind = WIND_KINDS[number % len(WIND_KINDS)]
@@ -193,10 +194,12 @@ def fleet_of(seed: int, number: int, folder: Path) -> tuple[str, dict[str, Any]]
         aside = k * LANES_APART_DEG
         start = (round(MIDDLE_DEG[0] - aside * math.cos(turn), 6), round(MIDDLE_DEG[1] + aside * math.sin(turn), 6))
         vehicles.append(_vehicle(rng, k + 1, start, turn, away_m))
-    document = _document(rng, f"fleet {number}", kind, _most_m_s(rng, vehicles), vehicles, folder)
+    most_m_s = _most_m_s(rng, vehicles)
+    document = _document(rng, f"fleet {number}", kind, most_m_s, vehicles, folder)
+    window_s = round(max(2.0, float(rng.uniform(0.5, 2.0)) * _blown_s(vehicles, most_m_s, away_m)))
     document["arrival"] = {
         "mode": "sequence", "order": "best", "clock": "fleet", "separation_m": 50,
-        "interval_s": round(float(rng.uniform(20.0, 60.0))), "window_s": round(float(rng.uniform(2.0, 10.0))),
+        "interval_s": window_s + round(float(rng.uniform(5.0, 60.0))), "window_s": window_s,
     }  # fmt: skip
     copters = [v for v in vehicles if v["autopilot"] == "arducopter"]
     if number % 2 and copters:
@@ -231,6 +234,12 @@ def _vehicle(
     }  # fmt: skip
     own = {"turn_radius_m": math.ceil(speed**2 / 3.0), "end": "loiter"} if wing else {"lean_angle_deg": 45}
     return vehicle | own
+
+
+def _blown_s(vehicles: Sequence[dict[str, Any]], most_m_s: float, away_m: float) -> float:
+    """About how much a wind changes the time of the slowest wing, s: what a user sees when he plans it alone."""
+    slowest = min((v["speed_m_s"][1] for v in vehicles if v["autopilot"] == "arduplane"), default=math.inf)
+    return away_m * most_m_s / slowest**2
 
 
 def _most_m_s(rng: np.random.Generator, vehicles: Sequence[dict[str, Any]]) -> float:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from itertools import pairwise, permutations
+
 import numpy as np
 import pytest
 
 from gcsplan.fleet.arrival import Mode, Schedule, Slot
-from gcsplan.fleet.intervals import Interval, centred, intervals
+from gcsplan.fleet.intervals import Interval, centred, intervals, steadiest
 from gcsplan.fleet.motion.timing import Route
-from gcsplan.wind.drift import Drifts
+from gcsplan.wind.drift import Drifts, between
 
 
 def schedule(*arrivals: float, mode: Mode = "sequence") -> Schedule:
@@ -58,3 +60,19 @@ def test_all_leave_later_where_one_would_leave_before_the_start() -> None:
     plan = centred(wanted, wanted, drifts(a=([0.0] * 4, [0.0] * 4), b=(late, late)))
     assert [slot.depart_s for slot in plan.slots] == [50.0, 0.0]
     assert [slot.arrive_s for slot in plan.slots] == [150.0, 100.0]
+
+
+def test_the_order_found_has_the_least_of_the_widest_windows() -> None:
+    rng = np.random.default_rng(3)
+    for count in (2, 3, 5, 6):
+        names = [f"v{k}" for k in range(count)]
+        found = {name: Drifts(-rng.uniform(0.0, 9.0, (8, 1)), rng.uniform(0.0, 9.0, (8, 1))) for name in names}
+        width = {
+            (a, b): 0.5 * float(high[0] - low[0])
+            for a, b in permutations(names, 2) for low, high in [between(found[a], found[b])]
+        }  # fmt: skip
+        least = min(max(width[two] for two in pairwise(order)) for order in permutations(names))
+        order = steadiest(names, found, 0.0)
+        assert sorted(order) == names
+        assert max(width[two] for two in pairwise(order)) == least
+        assert steadiest(names, found, 99.0) == names

@@ -17,15 +17,24 @@ from gcsplan.app.plan.problem import built
 from gcsplan.app.plan.vehicle import rebuilt
 from gcsplan.errors import NoMission
 from gcsplan.figures import floored, raised
-from gcsplan.fleet.arrival import Hold, Mode, Schedule
-from gcsplan.fleet.intervals import Interval
+from gcsplan.fleet.arrival import Crew, Hold, Mode, Schedule, schedule
+from gcsplan.fleet.intervals import Interval, steadiest
 from gcsplan.fleet.motion.timing import Course, flown_corners
 from gcsplan.fleet.resolve import NotSeparated
 from gcsplan.wind.drift import Drifts
 
-__all__ = ["NotInEveryWind", "at_speeds", "corners_cut_m", "drifts", "require_intervals", "steadier", "with_cures"]
+__all__ = [
+    "NotInEveryWind",
+    "at_speeds",
+    "corners_cut_m",
+    "drifts",
+    "in_steadiest_order",
+    "require_intervals",
+    "steadier",
+    "with_cures",
+]
 
-MOST_TRIED = 6
+MOST_TRIED = 8
 """Most vehicles with which a refusal tries what would do."""
 CURE_TRIES = 3
 """Winds, and intervals twice, that a refusal tries: up to the first that works, and then between."""
@@ -92,6 +101,21 @@ def at_speeds(vehicles: Sequence[VehiclePlan], plan: Schedule, brief: Brief) -> 
             except NoMission:
                 found[v.name] = v
     return found
+
+
+def in_steadiest_order(vehicles: Sequence[VehiclePlan], crews: Sequence[Crew], brief: Brief, spare_s: float) -> Brief:
+    """The brief with an order in which the declared winds change the intervals least, if it leaves the order open.
+
+    Its windows suffice if they can; ``spare_s``: seconds by which an interval may be beyond its window.
+    """
+    arrival = brief.source.arrival
+    if arrival is None or not arrival.best_order or arrival.mode != "sequence" or arrival.hold != "ground":
+        return brief
+    alone = schedule(crews, "none")
+    flown = at_speeds(vehicles, alone, brief)
+    found = {name: v.verdict.arrival_drift for name, v in flown.items()}
+    order = steadiest(alone.order, found, min(arrival.window_s + spare_s, arrival.interval_s))
+    return _with(brief, arrival=replace(arrival, order=tuple(order), best_order=False))
 
 
 def corners_cut_m(v: VehiclePlan, course: Course) -> float:

@@ -21,6 +21,7 @@ from gcsplan.app.fleet.every_wind import (
     at_speeds,
     corners_cut_m,
     drifts,
+    in_steadiest_order,
     require_intervals,
     steadier,
     with_cures,
@@ -178,18 +179,22 @@ def fleet_of(
         return _fleet_of(vehicles, _having(brief, gates), at_start if gates is None else gate, leaving, {})
 
     def again(tried: Sequence[VehiclePlan], terms: Brief) -> tuple[tuple[VehiclePlan, ...], FleetPlan]:
-        """With as few gates as are requested; as in still air, or else at speeds at which the vehicles drift less."""
+        """With as few gates as are requested; as in still air, at speeds at which the vehicles drift less, or in an
+        order, too, whose intervals drift less."""
         assert terms.source.arrival is not None
         request, refusal = terms.source.arrival.gates, NoMission("", reason="time")
         speeds = steadier(tried, terms.source.arrival.hold)
-        paces: list[Mapping[str, SpeedRange]] = [{}, speeds] if speeds else [{}]
+        paces: list[tuple[Mapping[str, SpeedRange], bool]] = [({}, False), (speeds, False)] if speeds else [({}, False)]
+        if terms.source.arrival.best_order:
+            paces.append((speeds, True))
         for gates in counts(None if request == "auto" and gate is None else request):
-            for pace in paces:
+            for pace, steady in paces:
                 start = at_start if gates is None else gate or GateTime(some_start(brief.source))
                 try:
-                    return _fleet_of(tried, _having(terms, gates), start, LeavingOut(allowed=False), pace)
+                    return _fleet_of(tried, _having(terms, gates), start, LeavingOut(allowed=False), pace, steady)
                 except NoMission as why:
-                    refusal = why
+                    if isinstance(why, NotInEveryWind) or not isinstance(refusal, NotInEveryWind):
+                        refusal = why
         raise refusal
 
     try:
@@ -203,7 +208,7 @@ def fleet_of(
     while True:
         tried = LeavingOut(allowed=True, found=leaving.found)
         try:
-            found = _fleet_of(vehicles, brief, gate, tried, speeds)
+            found = _fleet_of(vehicles, brief, gate, tried, speeds, steady=True)
         except NotInEveryWind as why:  # the sequence closes up
             for name in sorted(why.names):
                 leaving.leave(name, why)
@@ -224,9 +229,9 @@ def _having(brief: Brief, gates: int | GatePlaces | None) -> Brief:
 
 def _fleet_of(
     vehicles: Sequence[VehiclePlan], brief: Brief, gate: GateTime | None, leaving: LeavingOut,
-    speeds: Mapping[str, SpeedRange],
+    speeds: Mapping[str, SpeedRange], steady: bool = False,
 ) -> tuple[tuple[VehiclePlan, ...], FleetPlan]:  # fmt: skip
-    """`fleet_of`, with the ``speeds`` of some vehicles."""
+    """`fleet_of`, with the ``speeds`` of some vehicles; ``steady``: in an order in which winds change little."""
     world, arrival = brief.world, brief.source.arrival
     gates = None if arrival is None or gate is None else arrival.gates
     common, gate_times = gate, None if gates else gate
@@ -240,6 +245,9 @@ def _fleet_of(
     vehicles = on_way(vehicles, leaving)
     waiting = {v.name for v in vehicles if v.order.gates is not None}
     crews = [_paced(crew_of(v, world), _pace_of(v, speeds)) for v in vehicles]
+    if steady:
+        brief = in_steadiest_order(vehicles, crews, brief, 0.0 if gate is None else WHOLE_S)
+        arrival = brief.source.arrival
     notes: list[Note] = []
     requested = None
     if arrival is None:
