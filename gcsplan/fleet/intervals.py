@@ -18,7 +18,7 @@ from gcsplan.wind.drift import Drifts, between
 
 __all__ = ["Interval", "centred", "intervals", "steadiest"]
 
-MOST_STEPS = 100_000
+MOST_ORDER_STEPS = 100_000
 """Steps of the search for one order: enough for every order of 8 vehicles."""
 AGREES_S = 1e-3
 """Seconds by which an interval may be beyond its window: a time table is in float32 speeds."""
@@ -121,7 +121,7 @@ def _way_through(beside: Bools) -> list[int] | None:
     """The first order of all rows in which neighbours are ``beside`` each other; None if none is found."""
     count, way, visited, dead = len(beside), list[int](), 0, set[tuple[int, int]]()
     ahead = [iter(range(count))]
-    for _ in range(MOST_STEPS):
+    for _ in range(MOST_ORDER_STEPS):
         row = next(ahead[-1], None)
         if row is None:
             if not way:
