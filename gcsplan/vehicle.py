@@ -63,8 +63,10 @@ def fastest_at_m_s(lean_deg: float) -> float:
     return lean_deg / LEAN_DEG_PER_M_S
 
 
-def lean_words(lean_deg: float) -> Note:
-    """The parameter of the lean angle with its value, for every version of ArduCopter."""
+def lean_words(lean_deg: float, autopilot: Autopilot) -> Note:
+    """The parameter of the lean angle with its value, for every version of ArduCopter or PX4."""
+    if autopilot is Autopilot.PX4:
+        return Note("tilt_parameter", lean_deg=lean_deg)
     return Note("lean_parameter", lean_deg=lean_deg, lean_cdeg=100.0 * lean_deg)
 
 
@@ -166,7 +168,7 @@ class Vehicle:
     just above the ground. ``leg_jerk_m_s3`` is the jerk of the S-curves that ArduPilot flies its legs with; it bounds
     the speed on a short leg. An acceleration of ``inf`` is an instant change of speed, a corner acceleration of ``inf``
     a sharp corner at full speed. A climb or descent rate of ``inf`` means that the cruise speed is the speed in space,
-    whatever the slope: the ideal vehicle of the papers. ``lean_angle_deg`` is an ArduCopter's largest lean angle, and
+    whatever the slope: the ideal vehicle of the papers. ``lean_angle_deg`` is a multicopter's largest lean angle, and
     ``vel_max_m_s`` a PX4's MPC_XY_VEL_MAX: they have bounded ``speed_max_m_s`` already; None: they bound nothing.
     ``climb_out``: a fixed wing's, if it is known. ``blows_m_s``: the most that the declared winds and gusts blow along
     each of so many courses, evenly all around from east to north; of a fixed wing, whose `limits` then hold over ground
@@ -289,7 +291,7 @@ class Vehicle:
 
         A PX4 is taken for an airframe with the drag of ArduPilot's simulated quadrotor, as an ArduCopter is.
         """
-        return PX4_TILT_DEG if self.smooths else self.lean_angle_deg
+        return PX4_TILT_DEG if self.smooths and self.lean_angle_deg is None else self.lean_angle_deg
 
     @property
     def can_hold(self) -> bool:

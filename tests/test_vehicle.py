@@ -93,6 +93,6 @@ def test_the_acceptance_radius_is_whole_metres_of_one_byte(track_error_m: float,
 
 def test_lean_and_speed_are_each_others_inverse_and_told_in_both_units() -> None:
     assert fastest_at_m_s(lean_for_deg(12.5)) == pytest.approx(12.5)
-    assert str(lean_words(31.5)).startswith("ATC_ANGLE_MAX 31.5 (degrees")
-    assert "ANGLE_MAX 3150 (hundredths" in str(lean_words(31.5))
+    assert str(lean_words(31.5, Autopilot.ARDUCOPTER)).startswith("ATC_ANGLE_MAX 31.5 (degrees")
+    assert "ANGLE_MAX 3150 (hundredths" in str(lean_words(31.5, Autopilot.ARDUCOPTER))
     assert ClimbOut(3.0, 4.0).space_m_s == 5.0

@@ -314,9 +314,15 @@ def _speed_notes(vehicle: Vehicle, speed_m_s: float) -> list[Note]:
     if lean_deg > LARGEST_LEAN_DEG:
         return [Note("lean_beyond_largest", speed_m_s=speed_m_s, largest_deg=LARGEST_LEAN_DEG)]
     if lean_deg > DEFAULT_LEAN_DEG:
-        notes.append(Note("lean_to_set", speed_m_s=speed_m_s, lean_deg=lean_deg, parameter=lean_words(lean_deg)))
+        notes.append(
+            Note(
+                "lean_to_set", speed_m_s=speed_m_s, lean_deg=lean_deg, parameter=lean_words(lean_deg, vehicle.autopilot)
+            )
+        )
     if counts_deg > max(lean_deg, DEFAULT_LEAN_DEG):
-        notes.append(Note("lean_counted_with", lean_deg=counts_deg, parameter=lean_words(counts_deg)))
+        notes.append(
+            Note("lean_counted_with", lean_deg=counts_deg, parameter=lean_words(counts_deg, vehicle.autopilot))
+        )
     return notes
 
 

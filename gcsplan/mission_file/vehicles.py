@@ -136,12 +136,15 @@ WIND_COURSES = 72
 
 
 def in_wind(vehicle: Vehicle, wind: DeclaredWind) -> Vehicle:
-    """A fixed wing in the winds that its mission declares, with limits that hold over ground in each; others as given.
+    """A vehicle in the winds that its mission declares: a fixed wing with limits that hold over ground in each, a PX4
+    with its default lean if none is given.
 
     A wind adds to the speed over ground and not to the climb: slopes are less steep with the strongest wind behind.
     """
-    if wind.still or not vehicle.keeps_airspeed:
+    if wind.still:
         return vehicle
+    if not vehicle.keeps_airspeed:
+        return replace(vehicle, lean_angle_deg=vehicle.largest_lean_deg)
     courses_rad = 2.0 * np.pi * np.arange(WIND_COURSES) / WIND_COURSES
     limits, blows_m_s = vehicle.limits, tuple(wind.along_m_s(courses_rad).tolist())
     blown = replace(vehicle, blows_m_s=blows_m_s, climbs_deg=limits.max_climb_deg)
@@ -166,13 +169,13 @@ def within_lean(
 ) -> Vehicle:
     """``vehicle`` with the speeds that its lean angle allows, and a note if that is less than its keys want.
 
-    In local metres (the papers' worlds) an absent key is no bound.
+    In local metres (the papers' worlds) an absent key is no bound, nor is it for a PX4.
     """
     lean_deg = keys.lean_angle_deg
-    if vehicle.autopilot is not Autopilot.ARDUCOPTER:
-        problems += _of_another(vehicle, "ArduCopter", f"{where}.lean_angle_deg", lean_deg)
+    if vehicle.autopilot is Autopilot.ARDUPLANE:
+        problems += _of_another(vehicle, "a multicopter", f"{where}.lean_angle_deg", lean_deg)
         return vehicle
-    if lean_deg is None and local:
+    if lean_deg is None and (local or vehicle.autopilot is Autopilot.PX4):
         return vehicle
     leans_deg = DEFAULT_LEAN_DEG if lean_deg is None else lean_deg
     most, planned_m_s = fastest_at_m_s(leans_deg), vehicle.speed_max_m_s
@@ -182,7 +185,8 @@ def within_lean(
         notes.append(
             Note(
                 "lean_bounds_speed_curably" if curable else "lean_bounds_speed", most_m_s=most, wanted_m_s=planned_m_s,
-                lean_deg=leans_deg, by_default=lean_deg is None, needs_deg=needs_deg, setting=lean_words(needs_deg),
+                lean_deg=leans_deg, by_default=lean_deg is None, needs_deg=needs_deg,
+                setting=lean_words(needs_deg, vehicle.autopilot),
             )
         )  # fmt: skip
     return _no_faster(replace(vehicle, lean_angle_deg=leans_deg), most)

@@ -89,6 +89,7 @@ PLAN_TEXTS = {
         "flies this mission arrives late"
     ),
     "lean_to_set": "{speed_m_s:speed.2} needs a lean of about {lean_deg:g}°: set {parameter} before it flies",
+    "tilt_parameter": "MPC_TILTMAX_AIR {lean_deg:g}",
     "lean_parameter": (
         "ATC_ANGLE_MAX {lean_deg:g} (degrees, since ArduPilot 4.7) or ANGLE_MAX {lean_cdeg:g} (hundredths of a degree, "
         "before)"

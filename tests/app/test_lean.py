@@ -20,11 +20,12 @@ from gcsplan.app.upload.job import JobResult, UploadJob
 from gcsplan.app.upload.on_board import judge_on_board
 from gcsplan.errors import InputError
 from gcsplan.mavlink.link.session.parameters import judge_parameters, lean_shortage
+from gcsplan.mavlink.mission.parameter_list import parameter_list
 from gcsplan.mission_file import load_mission
 from gcsplan.sim.sitl.instances import parameters_of
 from gcsplan.sim.vehicle.loopback import LoopbackVehicle
 from gcsplan.sim.vehicle.server import SimServer
-from gcsplan.vehicle import Autopilot, lean_for_deg
+from gcsplan.vehicle import Autopilot, Vehicle, lean_for_deg
 from tests.support.impatient import be_impatient
 from tests.support.paths import MISSIONS
 
@@ -104,12 +105,34 @@ def test_a_lean_angle_of_the_file_bounds_the_speed(lean_deg: float, speed_m_s: f
         assert all(words in said(done) and words in page for words in BOTH)
 
 
-@pytest.mark.parametrize(("autopilot", "fastest_m_s"), [("px4", 12.0), ("arduplane", 15.0)])
-def test_other_autopilots_have_no_such_key(autopilot: str, fastest_m_s: float) -> None:
-    """PX4 is as fast as its MPC_XY_VEL_MAX, 12 m/s unless the file has another."""
-    assert load_mission(text=text_of(autopilot=autopilot)).vehicles[0].vehicle.speed_max_m_s == fastest_m_s
-    with pytest.raises(InputError, match=r"vehicles\[0\].lean_angle_deg: is ArduCopter's alone"):
-        load_mission(text=text_of(autopilot=autopilot, lean_angle_deg=45))
+def test_a_plane_has_no_such_key() -> None:
+    assert load_mission(text=text_of(autopilot="arduplane")).vehicles[0].vehicle.speed_max_m_s == 15.0
+    with pytest.raises(InputError, match=r"vehicles\[0\].lean_angle_deg: is a multicopter's alone"):
+        load_mission(text=text_of(autopilot="arduplane", lean_angle_deg=45))
+
+
+def px4(wind: dict[str, float] | None = None, **keys: Any) -> Vehicle:
+    mission = yaml.safe_load(text_of(autopilot="px4", **keys)) | ({"wind": wind} if wind else {})
+    vehicle = load_mission(text=yaml.safe_dump(mission)).vehicles[0].vehicle
+    assert vehicle is not None
+    return vehicle
+
+
+def test_the_largest_lean_of_a_px4_bounds_its_speed_where_it_is_given() -> None:
+    assert px4().speed_max_m_s == 12.0  # MPC_XY_VEL_MAX
+    assert px4().lean_angle_deg is None
+    assert px4(lean_angle_deg=20).speed_max_m_s == pytest.approx(20.0 / 3.0)
+
+
+@pytest.mark.parametrize(("keys", "wind", "least_deg"), [
+    ({}, None, None), ({}, {"up_to_m_s": 5.0}, 45.0), ({"lean_angle_deg": 36}, None, 36.0),
+])  # fmt: skip
+def test_what_a_px4_leans_stands_in_the_list_of_its_parameters(
+    keys: dict[str, float], wind: dict[str, float] | None, least_deg: float | None
+) -> None:
+    vehicle = px4(wind, **keys)
+    listed = {s.parameter.names[0].name: s.value for s in parameter_list(planned().vehicles[0].mission, vehicle)}
+    assert listed.get("MPC_TILTMAX_AIR") == least_deg
 
 
 @pytest.mark.parametrize("lean_deg", [9.9, 80.1, "45", True])

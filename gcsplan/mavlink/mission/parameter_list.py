@@ -192,10 +192,14 @@ def _copter(
     if any(FRAME_SYNONYMS.get(item.frame, item.frame) == TERRAIN for item in mission.items):
         why = Note("assumed_terrain_margin")
         rows.append(Setting(known["terrain_margin"], 10.0, "equal", why, _pace(mission, vehicle, WAYPOINT)))
-    if vehicle.lean_angle_deg is not None:
-        why = Note("assumed_lean", speed_m_s=_speed_m_s(mission, vehicle))
-        rows.append(Setting(known["lean"], vehicle.lean_angle_deg, "at least", why, "time"))
-    return _finite(rows + _altitude(known, rtl_rel_home_m, returns))
+    return _finite(rows + _lean(known, mission, vehicle) + _altitude(known, rtl_rel_home_m, returns))
+
+
+def _lean(known: Mapping[str, Parameter], mission: Mission, vehicle: Vehicle) -> list[Setting]:
+    if vehicle.lean_angle_deg is None:
+        return []
+    why = Note("assumed_lean", speed_m_s=_speed_m_s(mission, vehicle))
+    return [Setting(known["lean"], vehicle.lean_angle_deg, "at least", why, "time")]
 
 
 def _pace(mission: Mission, vehicle: Vehicle, *commands: int) -> Matters:
@@ -309,7 +313,7 @@ def _px4(mission: Mission, vehicle: Vehicle, rtl_rel_home_m: float | None, ends:
         Setting(known["return_waits"], vehicle.return_waits_s, "equal", Note("assumed_return_waits"),
                 "time" if ends else "report"),
     ]  # fmt: skip
-    return _finite(rows + _altitude(known, rtl_rel_home_m, returns))
+    return _finite(rows + _lean(known, mission, vehicle) + _altitude(known, rtl_rel_home_m, returns))
 
 
 def _finite(rows: Sequence[Setting]) -> list[Setting]:

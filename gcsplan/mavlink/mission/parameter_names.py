@@ -204,6 +204,7 @@ PARAMETERS: dict[Autopilot, dict[str, Parameter]] = {
         _one("accel", "MPC_ACC_HOR", 3.0, "m/s²"),
         _one("jerk", "MPC_JERK_AUTO", 4.0, "m/s³"),
         _one("corner", "MPC_XY_TRAJ_P", 0.5),
+        _one("lean", "MPC_TILTMAX_AIR", 45.0, "°"),
         _one("radius", "NAV_ACC_RAD", 10.0, "m"),
         _one("radius_height", "NAV_MC_ALT_RAD", 0.8, "m"),
         _one("return_altitude", "RTL_RETURN_ALT", 30.0, "m"),

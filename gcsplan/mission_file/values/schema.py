@@ -305,7 +305,8 @@ class VehicleKeys(LimitKeys):
     speed_m_s: SpeedRange = [3.0, 15.0]
     """Slowest and fastest cruise speed; one number is both. A fixed wing's is the airspeed that it indicates."""
     lean_angle_deg: Annotated[float, Field(ge=10.0, le=80.0)] | None = None
-    """ArduCopter's largest lean (`ATC_ANGLE_MAX`): 3° for each m/s of cruise; if absent 30, so 10 m/s at most."""
+    """Largest lean: ArduCopter's `ATC_ANGLE_MAX`, 3° for each m/s of cruise; if absent 30, so 10 m/s at most. PX4's
+    `MPC_TILTMAX_AIR`; if absent 45, in wind alone."""
     mpc_xy_vel_max_m_s: Speed | None = None
     """PX4's `MPC_XY_VEL_MAX`, the fastest cruise that it flies; if absent 12."""
     climb_m_s: Speed = 2.5
