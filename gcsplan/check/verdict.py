@@ -206,9 +206,12 @@ class Verdict:
 
     @property
     def drift(self) -> Drift | None:
-        """How much earlier or later each leg ends in each declared wind; None in still air, or if it cannot fly."""
+        """How much earlier or later each leg ends in each declared wind, and after a departure as late as it may be;
+        None in still air with a departure on time, or if it cannot fly."""
         blown = self.in_wind
-        return None if blown is None or blown.wind.still or blown.too_windy is not None else blown.drift
+        if blown is None or blown.too_windy is not None or (blown.wind.still and not blown.flies_in.late_s):
+            return None
+        return blown.drift
 
     @property
     def arrival_drift(self) -> Drifts:

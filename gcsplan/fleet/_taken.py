@@ -137,7 +137,7 @@ class Taken:
         self._first_box: list[int] = []
         self._levels = Boxes(np.zeros((0, 4)), np.zeros((0, 4))).levels()
         self._reach_s = rules.window_s  # the largest of all
-        self._ended = Drifts.none(0)  # where each motion ends
+        self._begun, self._ended = Drifts.none(0), Drifts.none(0)  # of each motion, where it begins and ends
 
     def add(self, path: TimedPath) -> None:
         """Give ``path`` priority over all that come later."""
@@ -150,7 +150,7 @@ class Taken:
         row = [*path.points[0, :2], *path.points[-1, :2], path.begin_s, path.end_s, float(self._lands(path))]
         self._pads = np.vstack([self._pads, row])
         self._reach_s = max(self._reach_s, reach_of(path, self.rules.window_s))
-        self._ended = self._ended.joined(path.end_drifts)
+        self._begun, self._ended = self._begun.joined(path.begin_drifts), self._ended.joined(path.end_drifts)
         self.paths.append(path)
 
     def forbidden(self, path: TimedPath, low_s: float = 0.0, high_s: float = 0.0, spare_m: float = 0.0) -> Spans:
@@ -225,11 +225,10 @@ class Taken:
 
         never = np.full(len(begins), math.inf)
         start, goal, begin, end = path.points[0], path.points[-1], path.begin_s, path.end_s
-        on_time = Drifts.none(1)  # nothing drifts before it takes off
         # In turn: another lands where this one waits and takes off; this one lands where another waits; both land.
-        rows.append((lands & near(start, goals), ends - begin + drifts(on_time, self._ended)[0], never))
+        rows.append((lands & near(start, goals), ends - begin + drifts(path.begin_drifts, self._ended)[0], never))
         if mine:
-            rows.append((near(goal, starts), -never, begins - end + drifts(path.end_drifts, on_time)[1]))
+            rows.append((near(goal, starts), -never, begins - end + drifts(path.end_drifts, self._begun)[1]))
             sooner, later = drifts(path.end_drifts, self._ended)
             rows.append((lands & near(goal, goals), ends - end - clear + sooner, ends - end + clear + later))
         who = np.concatenate([np.flatnonzero(hit) for hit, _, _ in rows])

@@ -246,8 +246,9 @@ def on_the_pads(paths: Sequence[TimedPath], rules: Rules) -> list[Conflict]:
     starts, goals = np.array([p.points[0] for p in paths]), np.array([p.points[-1] for p in paths])
     landing = np.array([not p.ends_in_air and p.name not in rules.leaving for p in paths])
     needed, wide = rules.needed_m - TOLERANCE_M, 2.0 * rules.window_s
-    # A landing's drift counts beside a take-off, which has none, and beside another landing's in the same wind.
+    # A landing's drift counts beside a take-off's, which depends on no wind, and beside another landing's in the same.
     early, late = np.array([(p.end_drifts.early.min(), p.end_drifts.late.max()) for p in paths]).T
+    latest = begins + np.array([p.begin_drifts.late.max() for p in paths])
     early, late = (np.minimum(early, -wide), np.maximum(late, wide)) if wide else (early, late)
 
     def near(a: Floats, b: Floats) -> Bools:
@@ -258,7 +259,7 @@ def on_the_pads(paths: Sequence[TimedPath], rules: Rules) -> list[Conflict]:
 
     cleared = ends + rules.pad_clear_s
     # [y, x]: vehicle y moves, vehicle x stands.
-    stands = landing[None, :] & (begins[:, None] >= (ends + early)[None, :])
+    stands = landing[None, :] & (latest[:, None] >= (ends + early)[None, :])
     leaves_beside = near(starts, goals) & stands & (begins[:, None] < (cleared + late)[None])
     later = ends[:, None] - ends[None, :]
     order = np.arange(len(paths))
@@ -267,7 +268,7 @@ def on_the_pads(paths: Sequence[TimedPath], rules: Rules) -> list[Conflict]:
     for y, x in np.argwhere(lands_beside).tolist():
         most_s = max(float(between(paths[y].end_drifts, paths[x].end_drifts)[1][0]), wide)
         lands_beside[y, x] = ends[y] < cleared[x] + most_s
-    lands_before = near(goals, starts) & landing[:, None] & ((ends + early)[:, None] <= begins[None, :])
+    lands_before = near(goals, starts) & landing[:, None] & ((ends + early)[:, None] <= latest[None, :])
 
     def conflict(
         kind: ConflictKind, y: int, x: int, place: Floats, stand: Floats, time_s: float, until: float

@@ -103,8 +103,8 @@ PLAN_TEXTS = {
         "{second}: {apart_m:distance.1}): vehicles that wait on the ground are not judged against each other"
     ),
     "departs_late": (
-        "it may depart up to {late_s:.0f} s late: its windows of arrival count that; the order, the intervals and the "
-        "separation of a fleet count its departure on time"
+        "it may depart up to {late_s:.0f} s late: its windows of arrival count that, and so do the order, the "
+        "intervals and the separation of a fleet"
     ),
     "judged_in_wind": (
         "the aircraft can fly the mission in all declared winds; windows of times stand beside the times in still air, "

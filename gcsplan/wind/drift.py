@@ -1,9 +1,10 @@
-"""How much earlier or later than in still air a flight is, in each wind of a set at once: its drift.
+"""How much earlier or later than planned a flight is, in each wind of a set at once: its drift.
 
 One wind of the set blows for a whole fleet, so the drifts of two vehicles belong together. A *witness* is a corner of a
 cell of winds. Any wind of a cell is a mean of the cell's corners; a drift in it is no less than the same mean of
 ``early``, and no more than that of ``late``. So two vehicles' drifts differ by no more than they do at one witness:
-`between`. In a set whose wind varies there is one witness for all, and the two ends belong to no wind together.
+`between`. In a set whose wind varies there is one witness for all, and the two ends belong to no wind together. Each
+vehicle departs late by itself, so its departure window is part of ``late`` at all witnesses.
 """
 
 from __future__ import annotations
@@ -66,11 +67,12 @@ def between(first: Drifts, second: Drifts) -> tuple[Floats, Floats]:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Drift:
-    """The drift of one flight at the ends of its N stretches, holds included; its departure has none.
+    """The drift of one flight at the ends of its N stretches, holds included.
 
     ``seq`` (N,) are the items' numbers, which never fall. ``early``, ``late`` (Q, N) in seconds. Along a stretch the
     drift rises by at most ``rises`` (Q, N), and falls by at most ``falls``, for each second in still air; ``loose_s``
-    (N,) come on top of that between the two ends.
+    (N,) come on top of that between the two ends. ``departs_s`` (N,): the part of ``late`` that is its departure's,
+    which is as late as the first of them.
     """
 
     seq: Indices
@@ -79,11 +81,23 @@ class Drift:
     rises: Floats
     falls: Floats
     loose_s: Floats
+    departs_s: Floats
 
     @property
     def moves(self) -> bool:
+        """Whether a declared wind, or a late departure, changes a time at all."""
+        return self.blown or bool((self.departs_s > UNMOVED_S).any())
+
+    @property
+    def blown(self) -> bool:
         """Whether a declared wind changes a time at all."""
-        return bool((np.abs(self.early) > UNMOVED_S).any() or (np.abs(self.late) > UNMOVED_S).any())
+        late = self.late - self.departs_s
+        return bool((np.abs(self.early) > UNMOVED_S).any() or (np.abs(late) > UNMOVED_S).any())
+
+    @property
+    def departure(self) -> Drifts:
+        """The drift with which it leaves the ground (1)."""
+        return Drifts(np.zeros((1, 1)), self.departs_s[None, :1])
 
     def at_end_of(self, stretch: int) -> Drifts:
         """The drift at the end of one stretch."""
@@ -112,7 +126,8 @@ class Drift:
         # A place that is past: the drift there, and what it may have changed by since. A place ahead: likewise.
         since = times_s[1:] - times_s[heads][of]
         until = times_s[np.append(heads[1:], len(items))][of] - times_s[:-1]
-        early, late = (np.column_stack([np.zeros(len(end)), end]) for end in (self.early, self.late))
+        begin = self.departure.wide(len(self.late))
+        early, late = np.hstack([begin.early, self.early]), np.hstack([begin.late, self.late])
         rises, falls = (_most(rate, first, last)[:, of] for rate in (self.rises, self.falls))
         loose = np.array([self.loose_s[a : b + 1].sum() for a, b in zip(first, last, strict=True)])[of]
         behind, ahead = first[of], last[of] + 1

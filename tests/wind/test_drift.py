@@ -34,6 +34,34 @@ def test_vehicles_meet_where_one_wind_brings_both_to_a_place_at_once() -> None:
     assert least_m([0.0, 50.0], [0.0, 20.0]) == pytest.approx(200.0 / np.sqrt(2.0))
 
 
+def leaving_late(path: TimedPath, late_s: float) -> TimedPath:
+    """A path in still air, with a departure that may be so late."""
+    none = np.zeros((1, 1))
+    drift = Drift(np.array([1]), none, none + late_s, none, none, np.zeros(1), np.array([late_s]))
+    return replace(path, pieces=np.ones(len(path.times_s) - 1, dtype=np.intp)).drifting(drift)
+
+
+@pytest.mark.parametrize(("west_s", "south_s"), [(30.0, 0.0), (0.0, 30.0), (80.0, 20.0), (20.0, 20.0)])
+def test_the_distance_of_late_departures_is_the_least_of_all_departures(west_s: float, south_s: float) -> None:
+    pair = [leaving_late(WEST, west_s), leaving_late(SOUTH, south_s)]
+    each = [
+        float(separation([WEST.delayed(a), SOUTH.delayed(b)], Rules(30.0)).distance_m[0, 1])
+        for a in np.arange(0.0, west_s + 1.0, 10.0) for b in np.arange(0.0, south_s + 1.0, 10.0)
+    ]  # fmt: skip
+    assert float(separation(pair, Rules(30.0)).distance_m[0, 1]) == pytest.approx(min(each), abs=1e-6)
+
+
+def test_a_late_departure_counts_beside_one_that_lands_there() -> None:
+    beside = TimedPath("beside", np.array([150.0, 300.0]), np.array([[1010.0, 0.0, 50.0], [2000.0, 0.0, 50.0]]), 300.0)
+
+    def kinds(path: TimedPath) -> set[str]:
+        return {c.kind for c in separation([WEST, path], Rules(30.0)).conflicts} - {"air"}
+
+    assert kinds(beside) == set()
+    assert kinds(leaving_late(beside, 40.0)) == set()
+    assert kinds(leaving_late(beside, 60.0)) == {"take-off", "landing"}
+
+
 def test_two_drifts_differ_by_no_more_than_at_one_witness() -> None:
     first = Drifts(np.array([[0.0], [9.0]]), np.array([[1.0], [10.0]]))
     second = Drifts(np.array([[2.0], [10.0]]), np.array([[3.0], [12.0]]))
@@ -43,7 +71,9 @@ def test_two_drifts_differ_by_no_more_than_at_one_witness() -> None:
 
 def test_a_drift_along_a_leg_lies_between_its_ends_and_its_rates() -> None:
     rates = np.full((1, 1), 0.1)
-    drift = Drift(np.array([1]), np.array([[4.0]]), np.array([[5.0]]), rates, np.zeros((1, 1)), np.zeros(1))
+    drift = Drift(
+        np.array([1]), np.array([[4.0]]), np.array([[5.0]]), rates, np.zeros((1, 1)), np.zeros(1), np.zeros(1)
+    )
     items = np.ones(4, dtype=np.intp)
     along = drift.along(np.array([0.0, 10.0, 20.0, 30.0, 50.0]), items)
     assert along.late[0].tolist() == pytest.approx([1.0, 2.0, 3.0, 5.0])

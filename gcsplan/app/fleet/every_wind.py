@@ -66,8 +66,13 @@ class NotInEveryWind(NoMission):
 
 
 def drifts(v: VehiclePlan) -> bool:
-    """Whether a declared wind changes a time of the vehicle's flight."""
+    """Whether a declared wind, or a late departure, changes a time of the vehicle's flight."""
     return v.verdict.drift is not None and v.verdict.drift.moves
+
+
+def _is_blown(v: VehiclePlan) -> bool:
+    """Whether a declared wind changes a time of the vehicle's flight."""
+    return v.verdict.drift is not None and v.verdict.drift.blown
 
 
 def steadier(vehicles: Sequence[VehiclePlan], hold: Hold) -> dict[str, SpeedRange]:
@@ -79,7 +84,7 @@ def steadier(vehicles: Sequence[VehiclePlan], hold: Hold) -> dict[str, SpeedRang
     found = {}
     for v in vehicles:
         blown, vehicle = v.verdict.in_wind, v.request.vehicle
-        if blown is None or not drifts(v):
+        if blown is None or not _is_blown(v):
             continue
         keeps_m_s = floored(blown.keeps_part * v.speed_m_s, 2)
         if vehicle.keeps_airspeed and hold == "ground":
@@ -120,7 +125,7 @@ def in_steadiest_order(vehicles: Sequence[VehiclePlan], crews: Sequence[Crew], b
 
 def corners_cut_m(v: VehiclePlan, course: Course) -> float:
     """How far a multicopter's way may be from the one in still air: where it is slower it cuts its corners less."""
-    if not drifts(v) or v.verdict.in_wind is None or v.verdict.in_wind.vehicle.keeps_airspeed:
+    if not _is_blown(v) or v.verdict.in_wind is None or v.verdict.in_wind.vehicle.keeps_airspeed:
         return 0.0
     corners, points = flown_corners(course.route), course.fly(v.speed_m_s).points
     a, along = corners[:-1], np.diff(corners, axis=0)
@@ -130,8 +135,12 @@ def corners_cut_m(v: VehiclePlan, course: Course) -> float:
     return float(off.min(axis=1).max())
 
 
-def require_intervals(found: Sequence[Interval], mode: Mode, window_s: float, drifts_of: Mapping[str, Drifts]) -> None:
-    """Raise NotInEveryWind unless order and intervals hold in every wind; ``drifts_of``: the arrivals' by name."""
+def require_intervals(
+    found: Sequence[Interval], mode: Mode, window_s: float, drifts_of: Mapping[str, Drifts],
+    vehicles: Sequence[VehiclePlan],
+) -> None:  # fmt: skip
+    """Raise NotInEveryWind unless order and intervals of ``vehicles`` hold in every wind, with late departures;
+    ``drifts_of``: the arrivals' by name."""
     bad = [one for one in found if not one.kept(mode, window_s)]
     if not bad:
         return
@@ -141,15 +150,19 @@ def require_intervals(found: Sequence[Interval], mode: Mode, window_s: float, dr
     request = f"{abs(round(worst.requested_s, 1)):g} s" + (
         f" ± {window_s:g} s (window_s)" if window_s else " (window_s: 0)"
     )
+    late_s = max(v.request.depart_window_s for v in vehicles)
+    when = "in the declared winds" if any(map(_is_blown, vehicles)) else ""
+    if late_s:
+        when += f"{', ' if when else ''}with departures up to {late_s:g} s late (depart_window_s),"
     raise NotInEveryWind(
-        f"in the declared winds {worst.second} arrives {apart} after {worst.first}, requested are {request}", least_s,
+        f"{when} {worst.second} arrives {apart} after {worst.first}, requested are {request}", least_s,
         frozenset(max(one.first, one.second, key=lambda name: drifts_of[name].most_s) for one in bad),
     )  # fmt: skip
 
 
 def with_cures(why: NoMission, vehicles: Sequence[VehiclePlan], brief: Brief, again: Retimed) -> NoMission:
-    """The refusal with what would do, each tried: a wider window, a longer interval, gates, lower speeds or a weaker
-    wind."""
+    """The refusal with what would do, each tried: a wider window, a longer interval, gates, lower speeds, a weaker wind
+    or shorter windows of departure."""
     if len(vehicles) > MOST_TRIED or not (isinstance(why, NotInEveryWind) or why.reason == "separation"):
         return why
     if isinstance(why, NotSeparated) and why.goals_m is not None and why.interval_s is None:
@@ -159,11 +172,12 @@ def with_cures(why: NoMission, vehicles: Sequence[VehiclePlan], brief: Brief, ag
         *_gates(vehicles, brief, again),
         *_speeds(vehicles, brief, again),
         *_winds(vehicles, brief, again),
+        *_departures(vehicles, brief, again),
     ]
     what = (
         f"what works: {', or '.join(found)}"
         if found
-        else "no window, interval, gate, speed or weaker wind that was tried helps"
+        else "no window, interval, gate, speed, departure or weaker wind that was tried helps"
     )
     return NoMission(f"{why}; {what}", reason="time" if isinstance(why, NotInEveryWind) else "separation")
 
@@ -236,24 +250,45 @@ def _winds(vehicles: Sequence[VehiclePlan], brief: Brief, again: Retimed) -> lis
     wind = brief.source.wind
 
     def works(up_to_m_s: float) -> bool:
-        weaker = _with(brief, wind=wind.scaled(up_to_m_s / wind.strongest_m_s))
-        try:
-            tried = []
-            for v in vehicles:
-                mission, verdict = built(weaker, v.request, v.solution, v.order)
-                tried.append(replace(v, mission=mission, verdict=verdict))
-            again(tried, weaker)
-        except NoMission:
-            return False
-        return True
+        return _judged_works(again, vehicles, _with(brief, wind=wind.scaled(up_to_m_s / wind.strongest_m_s)))
 
-    low_m_s, high_m_s = 0.0, wind.strongest_m_s
+    most_m_s = _most(wind.strongest_m_s, works)
+    return [f"winds of at most {most_m_s:g} m/s, gusts included"] if most_m_s else []
+
+
+def _departures(vehicles: Sequence[VehiclePlan], brief: Brief, again: Retimed) -> list[str]:
+    """The longest of some shorter windows of departure."""
+
+    def works(late_s: float) -> bool:
+        requests = [replace(v.request, depart_window_s=min(v.request.depart_window_s, late_s)) for v in vehicles]
+        tried = [replace(v, request=request) for v, request in zip(vehicles, requests, strict=True)]
+        return _judged_works(again, tried, brief)
+
+    most_s = _most(max(v.request.depart_window_s for v in vehicles), works)
+    return [f"depart_window_s: {most_s:g} at most"] if most_s else []
+
+
+def _most(refused: float, works: Callable[[float], bool]) -> float:
+    """The largest of some smaller values, in tenths, that works; 0 if none does."""
+    low, high = 0.0, refused
     for _ in range(CURE_TRIES):
-        middle_m_s = floored(0.5 * (low_m_s + high_m_s), 1)
-        if middle_m_s <= low_m_s:
+        middle = floored(0.5 * (low + high), 1)
+        if middle <= low:
             break
-        low_m_s, high_m_s = (middle_m_s, high_m_s) if works(middle_m_s) else (low_m_s, middle_m_s)
-    return [f"winds of at most {low_m_s:g} m/s, gusts included"] if low_m_s else []
+        low, high = (middle, high) if works(middle) else (low, middle)
+    return low
+
+
+def _judged_works(again: Retimed, vehicles: Sequence[VehiclePlan], brief: Brief) -> bool:
+    """As `_works`, with the missions judged anew."""
+    try:
+        tried = []
+        for v in vehicles:
+            mission, verdict = built(brief, v.request, v.solution, v.order)
+            tried.append(replace(v, mission=mission, verdict=verdict))
+    except NoMission:
+        return False
+    return _works(again, tried, brief)
 
 
 def _with(brief: Brief, **changes: object) -> Brief:

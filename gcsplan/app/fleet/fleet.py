@@ -295,8 +295,15 @@ def _fleet_of(
     return tuple(flown), FleetPlan(
         plan.mode, order, plan.interval_s, tuple(slots), tuple(motions), found, tuple(notes),
         None if gate is None else gate.start, apart,
-        None if any(v.verdict.drift is None for v in flown) else arrival is not None or not any(map(drifts, flown)),
+        _in_every_wind(flown, brief),
     )  # fmt: skip
+
+
+def _in_every_wind(flown: Sequence[VehiclePlan], brief: Brief) -> bool | None:
+    """Whether the whole time table holds in every declared wind; None in still air."""
+    if brief.source.wind.still or any(v.verdict.drift is None for v in flown):
+        return None
+    return brief.source.arrival is not None or not any(map(drifts, flown))
 
 
 def _judged(
@@ -365,13 +372,14 @@ def _intervals(
     requested: Schedule | None, flown: Sequence[VehiclePlan], slots: Sequence[Slot], arrival: ArrivalRequest | None,
     gate: GateTime | None,
 ) -> tuple[Interval, ...]:  # fmt: skip
-    """The intervals over all declared winds; none in still air. Raises NotInEveryWind if they are not kept."""
+    """The intervals over all declared winds and departures; none in still air with departures on time. Raises
+    NotInEveryWind if they are not kept."""
     if requested is None or arrival is None or all(v.verdict.drift is None for v in flown):
         return ()
     arrivals = {v.name: v.verdict.arrival_drift for v in flown}
     found = intervals(requested, slots, arrivals)
     if any(drifts(v) for v in flown):  # gates open at whole seconds
-        require_intervals(found, arrival.mode, arrival.window_s + (0.0 if gate is None else WHOLE_S), arrivals)
+        require_intervals(found, arrival.mode, arrival.window_s + (0.0 if gate is None else WHOLE_S), arrivals, flown)
     return tuple(found)
 
 

@@ -212,10 +212,12 @@ def _fleet(plan: Plan) -> dict[str, Any]:
 
 
 def _fleet_in_wind(fleet: FleetPlan | None) -> dict[str, Any]:
-    """Whether the time table holds in every declared wind, and the intervals between arrivals; empty in still air."""
-    if fleet is None or fleet.in_every_wind is None or len(fleet.slots) < 2:
+    """Whether the time table holds in every declared wind, and the intervals between arrivals; empty in still air with
+    departures on time."""
+    if fleet is None or len(fleet.slots) < 2 or (fleet.in_every_wind is None and not fleet.intervals):
         return {}
-    return {"in_every_wind": fleet.in_every_wind, "intervals": [asdict(one) for one in fleet.intervals]}
+    held = {} if fleet.in_every_wind is None else {"in_every_wind": fleet.in_every_wind}
+    return held | {"intervals": [asdict(one) for one in fleet.intervals]}
 
 
 def _vehicle(

@@ -157,8 +157,13 @@ class FlightInWind:
         """
         if self.too_windy is not None:
             return None
-        found, late_s = self._timed[0], np.where(self._gate < 0, self.flies_in.late_s, 0.0)
-        return TimeWindow(found.earliest_s + self._opened_s, found.latest_s + self._opened_s + late_s)
+        found, opened_s = self._timed[0], self._opened_s
+        return TimeWindow(found.earliest_s + opened_s, found.latest_s + opened_s + self._departs_late_s)
+
+    @property
+    def _departs_late_s(self) -> Floats:
+        """(N,) by how much a stretch may end later because of a late departure, for which the first gate makes up."""
+        return np.where(self._gate < 0, self.flies_in.late_s, 0.0)
 
     @cached_property
     def _timed(self) -> tuple[TimeWindow, Floats]:
@@ -188,7 +193,8 @@ class FlightInWind:
 
     @cached_property
     def drift(self) -> Drift:
-        """How much earlier or later than in still air each stretch ends, its hold included, in each wind at once.
+        """How much earlier or later than planned each stretch ends, its hold included, in each wind at once, and after
+        a departure as late as it may be.
 
         Of a flight that can be flown in all winds and flies no stretch twice. Gusts have no share in what two vehicles
         have in common: theirs count outward for each.
@@ -211,7 +217,7 @@ class FlightInWind:
         beside = np.maximum(self._uneven_s, np.maximum(np.roll(self._uneven_s, 1), np.roll(self._uneven_s, -1)))
         loose_s = gusts_s + np.where((rises + falls).any(axis=0), beside, 0.0)
         loose_s += np.abs(least_s - hold) + np.abs(most_s - hold)
-        early, late = earliest_s - still_s, found.latest_s + late_s - still_s
+        early, late = earliest_s - still_s, found.latest_s + late_s + self._departs_late_s - still_s
         for k in np.flatnonzero(self._waits).tolist():  # waiting makes up for the drift, second by second
             early[:, k] = late[:, k] = loose_s[k] = 0.0
             hold_s = max(self.stretches[k].hold_s, _LEAST_WAIT_S)
@@ -219,7 +225,8 @@ class FlightInWind:
                 np.maximum(-early[:, k - 1], 0.0) / hold_s,
                 np.maximum(late[:, k - 1], 0.0) / hold_s,
             )
-        return Drift(np.array([s.seq for s in self.stretches], dtype=np.intp), early, late, rises, falls, loose_s)
+        seq = np.array([s.seq for s in self.stretches], dtype=np.intp)
+        return Drift(seq, early, late, rises, falls, loose_s, self._departs_late_s)
 
     @cached_property
     def keeps_part(self) -> float:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -35,7 +35,8 @@ class TimedPath:
     and amsl_m at those times. Before the first and after the last time the vehicle stands on the ground at its first or
     last point (with ``ends_in_air`` it stays at its last point for good). ``arrive_s`` is the time at which it reaches
     the goal at approach_agl_m. ``pieces`` (N - 1,) is the caller's number of each piece (its wire item), -1 if there is
-    none. ``drifts`` (of N - 1 pieces): how much earlier or later each is in the declared winds; None: not at all.
+    none. ``drifts`` (of N - 1 pieces): how much earlier or later each is in the declared winds, and ``begin_drifts``
+    (1) its departure; None: not at all.
     """
 
     name: str
@@ -45,6 +46,7 @@ class TimedPath:
     ends_in_air: bool = False
     pieces: Indices | None = None
     drifts: Drifts | None = None
+    begin_drifts: Drifts = field(default_factory=lambda: Drifts.none(1))
 
     def __post_init__(self) -> None:
         if self.times_s.ndim != 1 or self.points.shape != (len(self.times_s), 3) or len(self.times_s) < 2:
@@ -72,14 +74,14 @@ class TimedPath:
         return replace(self, times_s=self.times_s + by_s, arrive_s=self.arrive_s + by_s)
 
     def drifting(self, drift: Drift | None) -> TimedPath:
-        """The same motion with its drifts, cut where they change; itself if no wind changes a time."""
+        """The same motion with its drifts, cut where they change; itself if no time changes."""
         if drift is None or not drift.moves or self.pieces is None:
             return self
         times_s = drift.cut(self.times_s, self.pieces)
         of = np.searchsorted(self.times_s, times_s[:-1], side="right") - 1
         return replace(
             self, times_s=times_s, points=self.at(times_s), pieces=self.pieces[of],
-            drifts=drift.along(times_s, self.pieces[of]),
+            drifts=drift.along(times_s, self.pieces[of]), begin_drifts=drift.departure,
         )  # fmt: skip
 
     @property

@@ -17,6 +17,7 @@ from gcsplan.app.fleet.fleet import route_of
 from gcsplan.app.fleet.pipeline import plan
 from gcsplan.app.output.files import outputs_of, summary_of
 from gcsplan.app.plan.model import Plan
+from gcsplan.app.rehearse import rehearse, weather_of
 from gcsplan.errors import InputError, NoMission
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mission_file import load_mission
@@ -346,7 +347,26 @@ def test_a_fleet_that_asks_for_no_arrival_is_timed_in_still_air() -> None:
 
 def test_departures_alone_say_nothing_of_declared_winds() -> None:
     late = {"depart_window_s": 20}
-    done = planned(sequence(20), late, late)
+    done = planned(sequence(20, window_s=20), late, late)
     assert all(v.verdict.in_wind is not None for v in done.vehicles)  # which has the windows
     assert not [n.code for n in done.notes if n.code.startswith("schedule_")]
-    assert not {"in_every_wind", "intervals"} & summary_of(done)["fleet"].keys()
+    fleet = summary_of(done)["fleet"]
+    assert "in_every_wind" not in fleet
+    assert [(round(one["least_s"], 3), round(one["most_s"], 3)) for one in fleet["intervals"]] == [(0.0, 40.0)]
+
+
+@pytest.mark.slow
+def test_a_window_narrower_than_the_departures_is_refused_with_what_works() -> None:
+    late = {"depart_window_s": 20}
+    with pytest.raises(NoMission, match=r"departures up to 20 s late .* arrives 0\.0 to 40\.0 s after") as refused:
+        planned(sequence(20, window_s=10), late, late)
+    assert "what works: window_s: 20" in str(refused.value)
+    assert "depart_window_s: 10 at most" in str(refused.value)
+
+
+@pytest.mark.nightly
+def test_drawn_late_departures_keep_a_sequence_that_counts_them() -> None:
+    done = planned(sequence(40, window_s=15), {"depart_window_s": 20}, {"depart_window_s": 5}, wind={"up_to_m_s": 4})
+    assert [round(one["most_s"] - one["least_s"], 3) for one in summary_of(done)["fleet"]["intervals"]] == [25.0]
+    flown = rehearse(done, weather=weather_of(done.source, None, None, 0.0, 0.0), runs=30, seed=1)
+    assert flown.order_kept_runs == flown.intervals_kept_runs == flown.separation_kept_runs == 30
