@@ -28,6 +28,7 @@ __all__ = [
     "at_speeds",
     "corners_cut_m",
     "drifts",
+    "in_every_wind",
     "in_steadiest_order",
     "require_intervals",
     "steadier",
@@ -73,6 +74,13 @@ def drifts(v: VehiclePlan) -> bool:
 def _is_blown(v: VehiclePlan) -> bool:
     """Whether a declared wind changes a time of the vehicle's flight."""
     return v.verdict.drift is not None and v.verdict.drift.blown
+
+
+def in_every_wind(flown: Sequence[VehiclePlan], brief: Brief) -> bool | None:
+    """Whether the whole time table holds in every declared wind; None in still air."""
+    if brief.source.wind.still or any(v.verdict.drift is None for v in flown):
+        return None
+    return brief.source.arrival is not None or not any(map(drifts, flown))
 
 
 def steadier(vehicles: Sequence[VehiclePlan], hold: Hold) -> dict[str, SpeedRange]:

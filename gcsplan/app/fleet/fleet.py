@@ -21,6 +21,7 @@ from gcsplan.app.fleet.every_wind import (
     at_speeds,
     corners_cut_m,
     drifts,
+    in_every_wind,
     in_steadiest_order,
     require_intervals,
     steadier,
@@ -31,6 +32,7 @@ from gcsplan.app.fleet.gates import (
     counts,
     gated,
     gates_bought,
+    having,
     no_time_of_day,
     some_start,
     waits_for_time,
@@ -38,7 +40,7 @@ from gcsplan.app.fleet.gates import (
 from gcsplan.app.fleet.reroute import Detours
 from gcsplan.app.fleet.start_time import SLACK_S, GateTime, with_start_gates
 from gcsplan.app.plan.flight_hours import within_hours
-from gcsplan.app.plan.left_out import LeavingOut, least_to_leave
+from gcsplan.app.plan.left_out import LeavingOut, LeftOut, least_to_leave
 from gcsplan.app.plan.model import Brief, FleetPlan, Plan, VehiclePlan
 from gcsplan.app.plan.vehicle import over_one_terrain, rebuilt
 from gcsplan.arrays import Floats
@@ -50,7 +52,6 @@ from gcsplan.fleet.arrival import Craft, Crew, NoSchedule, Schedule, Slot, sched
 from gcsplan.fleet.intervals import Interval, centred, intervals
 from gcsplan.fleet.motion.timing import Course, Route, TimedPath, motion_error_m
 from gcsplan.mission_file import ArrivalRequest
-from gcsplan.mission_file.request import GatePlaces
 from gcsplan.notes.note import Note
 from gcsplan.planners.problem import Progress
 from gcsplan.world.world import World
@@ -176,7 +177,7 @@ def fleet_of(
     at_start = gate if arrival is None or arrival.gates is None else None  # else they wait on the way, or nowhere
     if arrival is None or len(vehicles) < 2 or not any(drifts(v) for v in vehicles):
         gates = None if arrival is None else next(counts(arrival.gates))
-        return _fleet_of(vehicles, _having(brief, gates), at_start if gates is None else gate, leaving, {})
+        return _fleet_of(vehicles, having(brief, gates), at_start if gates is None else gate, leaving, {})
 
     def again(tried: Sequence[VehiclePlan], terms: Brief) -> tuple[tuple[VehiclePlan, ...], FleetPlan]:
         """With as few gates as are requested; as in still air, at speeds at which the vehicles drift less, or in an
@@ -191,7 +192,7 @@ def fleet_of(
             for pace, steady in paces:
                 start = at_start if gates is None else gate or GateTime(some_start(brief.source))
                 try:
-                    return _fleet_of(tried, _having(terms, gates), start, LeavingOut(allowed=False), pace, steady)
+                    return _fleet_of(tried, having(terms, gates), start, LeavingOut(allowed=False), pace, steady)
                 except NoMission as why:
                     if isinstance(why, NotInEveryWind) or not isinstance(refusal, NotInEveryWind):
                         refusal = why
@@ -202,29 +203,45 @@ def fleet_of(
     except NoMission as why:
         if not leaving.allowed:
             raise with_cures(why, vehicles, brief, again) from why
-    gates = None if isinstance(arrival.gates, str) else arrival.gates
-    brief, gate = _having(brief, gates), at_start if gates is None else gate
-    speeds = steadier(vehicles, arrival.hold)
-    while True:
-        tried = LeavingOut(allowed=True, found=leaving.found)
+    best: tuple[tuple[tuple[VehiclePlan, ...], FleetPlan], LeavingOut] | None = None
+    refusal: NoMission | None = None
+    for gates in counts(None if arrival.gates == "auto" and gate is None else arrival.gates):
+        start = at_start if gates is None else gate
         try:
-            found = _fleet_of(vehicles, brief, gate, tried, speeds, steady=True)
+            one = _leaving_out(vehicles, having(brief, gates), start, leaving.found)
+        except NoMission as why:
+            refusal = refusal or why
+            continue
+        if best is None or len(one[1].found) < len(best[1].found):
+            best = one
+        if len(one[1].found) == len(leaving.found) + 1:
+            break  # not fewer, for with all it is refused
+    if best is None:
+        assert refusal is not None
+        raise refusal
+    leaving.found = best[1].found
+    return best[0]
+
+
+def _leaving_out(
+    vehicles: Sequence[VehiclePlan], brief: Brief, gate: GateTime | None, found: Sequence[LeftOut]
+) -> tuple[tuple[tuple[VehiclePlan, ...], FleetPlan], LeavingOut]:
+    """`fleet_of` without the vehicles that cannot keep the time table with these gates, and who is left out, ``found``
+    included. Raises NoMission if none is left."""
+    arrival = brief.source.arrival
+    assert arrival is not None
+    speeds, left = steadier(vehicles, arrival.hold), LeavingOut(allowed=True, found=found)
+    while True:
+        tried = LeavingOut(allowed=True, found=left.found)
+        waits = arrival.gates is None or any(waits_for_time(v.request.vehicle) for v in vehicles)
+        terms, start = (brief, gate) if waits else (having(brief, None), None)
+        try:
+            return _fleet_of(vehicles, terms, start, tried, speeds, steady=True), tried
         except NotInEveryWind as why:  # the sequence closes up
             for name in sorted(why.names):
-                leaving.leave(name, why)
+                left.leave(name, why)
             vehicles = [v for v in vehicles if v.name not in why.names]
-            leaving.require_some(vehicles)
-            continue
-        leaving.found = tried.found
-        return found
-
-
-def _having(brief: Brief, gates: int | GatePlaces | None) -> Brief:
-    """The brief with these gates."""
-    arrival = brief.source.arrival
-    if arrival is None or arrival.gates == gates:
-        return brief
-    return replace(brief, source=replace(brief.source, arrival=replace(arrival, gates=gates)))
+            left.require_some(vehicles)
 
 
 def _fleet_of(
@@ -295,15 +312,8 @@ def _fleet_of(
     return tuple(flown), FleetPlan(
         plan.mode, order, plan.interval_s, tuple(slots), tuple(motions), found, tuple(notes),
         None if gate is None else gate.start, apart,
-        _in_every_wind(flown, brief),
+        in_every_wind(flown, brief),
     )  # fmt: skip
-
-
-def _in_every_wind(flown: Sequence[VehiclePlan], brief: Brief) -> bool | None:
-    """Whether the whole time table holds in every declared wind; None in still air."""
-    if brief.source.wind.still or any(v.verdict.drift is None for v in flown):
-        return None
-    return brief.source.arrival is not None or not any(map(drifts, flown))
 
 
 def _judged(

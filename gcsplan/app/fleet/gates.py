@@ -28,7 +28,7 @@ from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.geometry.path import nearest_on, track_length_m
 
-__all__ = ["WHERE", "counts", "gated", "gates_bought", "no_time_of_day", "some_start", "waits_for_time"]
+__all__ = ["WHERE", "counts", "gated", "gates_bought", "having", "no_time_of_day", "some_start", "waits_for_time"]
 
 WHERE = "arrival.gates"
 MOST_SOUGHT = 8
@@ -56,6 +56,14 @@ def counts(request: GateRequest) -> Iterator[int | GatePlaces | None]:
         yield from (None, *range(1, MOST_SOUGHT + 1))
     else:
         yield request
+
+
+def having(brief: Brief, gates: int | GatePlaces | None) -> Brief:
+    """The brief with these gates."""
+    arrival = brief.source.arrival
+    if arrival is None or arrival.gates == gates:
+        return brief
+    return replace(brief, source=replace(brief.source, arrival=replace(arrival, gates=gates)))
 
 
 def waits_for_time(vehicle: Vehicle) -> bool:

@@ -193,3 +193,17 @@ def test_no_wind_that_is_drawn_breaks_a_fleet_with_gates(seed: int) -> None:
             assert found.least_s - WITHIN_S <= apart_s <= found.most_s + WITHIN_S
             assert abs(apart_s - arrival["interval_s"]) <= window_s + 1.0 + WITHIN_S
         assert least_m(list(tracks.values())) >= SEPARATION_M - WITHIN_M
+
+
+@pytest.mark.nightly
+def test_gates_come_before_vehicles_are_left_out() -> None:
+    mission = lane("auto", {"up_to_m_s": 4}, 3)
+    mission["arrival"] |= {"leave_out": True, "window_s": 12}
+    ends = {"start": {"east_m": -2000, "north_m": 900}, "goal": {"east_m": 5000, "north_m": 900}, "end": "loiter"}
+    wing = {"autopilot": "arduplane", "turn_radius_m": 90, "speed_m_s": [16, 20], "lean_angle_deg": None}
+    mission["vehicles"][2] |= ends | wing
+    done = plan(mission, gate_utc=START)
+    assert [one.name for one in done.left_out] == ["c3"]
+    assert [len(v.order.gates.at_m) for v in done.vehicles if v.order.gates is not None] == [1, 1]
+    assert done.fleet is not None
+    assert done.fleet.in_every_wind is True
