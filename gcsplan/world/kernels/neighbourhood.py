@@ -63,12 +63,18 @@ class LineBatch:
 
     def _met(self, grid: GridMap, field: Field, shape: tuple[int, ...]) -> Bools:
         start, end = self._start[:, :2], self._end[:, :2]
+        spacing_m = SPACING * min(field.step_x, field.step_y)
         length = np.hypot(*(end - start).T)
-        parts = np.ceil(length / (SPACING * min(field.step_x, field.step_y))).astype(np.intp) + 1
-        line = np.repeat(np.arange(len(parts)), parts)
-        nth = np.arange(len(line)) - np.repeat(np.cumsum(parts) - parts, parts)
-        t = nth / np.maximum(parts[line] - 1, 1)
-        places = start[line] + t[:, None] * (end - start)[line]
+        if length.any():
+            parts = np.ceil(length / spacing_m).astype(np.intp) + 1
+            line = np.repeat(np.arange(len(parts)), parts)
+            nth = np.arange(len(line)) - np.repeat(np.cumsum(parts) - parts, parts)
+            t = nth / np.maximum(parts[line] - 1, 1)
+            places = start[line] + t[:, None] * (end - start)[line]
+        else:  # places of a raster: those that follow each other in a small square are as near as on a line
+            square, new = np.floor(start / (spacing_m / 3.0)), np.ones(len(start), np.bool_)
+            new[1:] = (square[1:] != square[:-1]).any(axis=1)
+            places = start[new]
         cells = grid(*places.T)[:, ::-1] / TILE
         beside, most = (0.5 * SPACING + BOW) / TILE, np.array(shape) - 1.0
         low, high = (np.floor(cells + d).clip(0.0, most).astype(np.intp) for d in (-beside, beside))

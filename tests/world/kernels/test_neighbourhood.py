@@ -137,6 +137,25 @@ def test_lines_find_all_that_they_meet_looked_at_and_little_else(
     assert same_where_seen(copy.extrema, whole, cells[:, 1], cells[:, 0])
 
 
+@pytest.mark.parametrize("in_order", [True, False])
+def test_places_of_a_raster_have_all_their_cells_looked_at(in_order: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(5)
+    z = rough(rng, (300, 400), 1e-4)
+    grid = GridMap.affine(0.0, 0.0, 5.0, 4.0)
+    field = Field.of(grid)
+    whole = extrema_around(field, z, 4.0)
+    monkeypatch.setattr(_neighbourhood, "LARGE_WINDOW", 1000)
+    ours = Neighbourhood(grid, field, z, 4.0)
+    x, y = np.meshgrid(np.arange(330.0, 660.0, 3.0), -np.arange(10.0, 500.0, 3.0))
+    places = np.stack([x.ravel(), y.ravel()], axis=-1)
+    places = places if in_order else rng.permutation(places)
+    ours.along(LineBatch(places, places))
+    cells = np.floor(grid(*places.T)).astype(np.intp)
+    assert same_where_seen(ours.extrema, whole, cells[:, 1], cells[:, 0])
+    assert not ours.seen.all()
+    ours.along(LineBatch(places[:0], places[:0]))
+
+
 @pytest.mark.nightly
 def test_what_is_looked_at_in_part_judges_as_what_is_looked_at_as_a_whole(monkeypatch: pytest.MonkeyPatch) -> None:
     rng = np.random.default_rng(8)
