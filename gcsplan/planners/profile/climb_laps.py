@@ -258,10 +258,10 @@ def _promising(problem: Problem, track: Track, lack: Lacking, length_m: float) -
     low = float(lack.profile.at(np.array([low_s]))[0])
     found = list(_detours(problem, track, low_s, high_s, length_m))
     shapes = [d.shape if up else d.shape[::-1] for d in found]
-    part = np.linspace(0.0, 1.0, LOOKED_AT)
-    along = np.array([part * distances_m(shape)[-1] for shape in shapes])
+    so_far = [distances_m(shape) for shape in shapes]
+    along = np.linspace(0.0, [s[-1] for s in so_far], LOOKED_AT, axis=1)
     east, north = (
-        np.array([np.interp(at, distances_m(way), way[:, k]) for at, way in zip(along, shapes, strict=True)])
+        np.array([np.interp(at, s, shape[:, k]) for at, s, shape in zip(along, so_far, shapes, strict=True)])
         for k in range(2)
     )
     floor = problem.airspace.floor_amsl(east.ravel(), north.ravel(), problem.limits).reshape(along.shape)

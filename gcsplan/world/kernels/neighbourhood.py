@@ -71,7 +71,7 @@ class LineBatch:
             nth = np.arange(len(line)) - np.repeat(np.cumsum(parts) - parts, parts)
             t = nth / np.maximum(parts[line] - 1, 1)
             places = start[line] + t[:, None] * (end - start)[line]
-        else:  # places of a raster: those that follow each other in a small square are as near as on a line
+        else:  # a raster: places in a row in one small square are as near to the first as on a line
             square, new = np.floor(start / (spacing_m / 3.0)), np.ones(len(start), np.bool_)
             new[1:] = (square[1:] != square[:-1]).any(axis=1)
             places = start[new]

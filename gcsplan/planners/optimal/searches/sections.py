@@ -39,6 +39,8 @@ WORTH_MORE = 0.03
 """Part of the gap that a look must close for the next one to follow."""
 NEARER_PATH = 0.7
 """Part of the gap it left, to which a better path must have closed it for another run."""
+AIM = 0.7
+"""Part of the gap that a later look closes at most: it keeps to the places of paths that are cheaper than that."""
 LEAST_STEP, MOST_STEP = 1.0 / 40.0, 1.0
 """Least and most metres between nodes, as parts of the spacing."""
 LEG_S = 1e-8
@@ -90,7 +92,7 @@ def _side(problem: Problem, limit: float) -> tuple[Floats, Floats, Floats]:
 
 class SectionChains(Search):
     """Under a maximum AGL, when a path is known: one look after another, while they close the gap; and one look more
-    after a much better path. Remembers the last look, which the next one begins with."""
+    after a much better path. Remembers the last look, unless no path was left of it: the next one begins there."""
 
     NAME, IMPROVES, SHARE = "sections", "paths, bounds", 0.8
 
@@ -132,22 +134,25 @@ class SectionChains(Search):
         planes, (pairs, halvings) = Planes.of(self.problem), LOOKS[self._next]
         if not plane.legs or not plane.reach_longest():
             return
-        sections, before = self._laid_out(planes, self._looked, pairs, halvings), self._looked
+        before = self._looked
+        aim = incumbent.cost if before is None else min(incumbent.bound + AIM * gap, before.cost)
+        sections = self._laid_out(planes, before, pairs, halvings, aim)
         if sections is None:
             return
-        looked = self._looked = _Look(planes, sections, incumbent.cost)
+        looked = _Look(planes, sections, aim)
         incumbent.budget.spend("section", looked.pairs)
         chain = looked.chain() if math.isfinite(looked.bound) else None
+        self._looked = None if chain is None else looked
         if chain is not None:
             incumbent.take_along(sections.track_of(chain))
-        incumbent.raise_bound(looked.bound)
+        incumbent.raise_bound(min(looked.bound, aim))
         halved = before is not None and len(sections.lines) > len(before.sections.lines)
         little = gap - (incumbent.cost - incumbent.bound) < WORTH_MORE * gap
         after = self._next + 1
         near = sections.step_m <= NEAR_NODES * float(sections.gap.max())
         if near and after < len(LOOKS) and LOOKS[after][1] == halvings:
             after += 1
-        self._goes_on = after < len(LOOKS) and not (halved and little)
+        self._goes_on = after < len(LOOKS) and chain is not None and not (halved and little)
         self._next, self._left = min(after, len(LOOKS) - 1), incumbent.gap
         if chain is not None and (halvings > 0 or not self._goes_on) and incumbent.gap > BAND_FAR:
             _, pinned, pin_m = sections.track_of(chain)
@@ -155,9 +160,11 @@ class SectionChains(Search):
             if found is not None:
                 incumbent.take_simpler(*found, fine=False, longer=False)
 
-    def _laid_out(self, planes: Planes, looked: _Look | None, pairs: float, halvings: int) -> Sections | None:
-        """The nodes of the next look, over what the last one left; None if they are too far apart, or lie over unknown
-        ground."""
+    def _laid_out(
+        self, planes: Planes, looked: _Look | None, pairs: float, halvings: int, aim: float
+    ) -> Sections | None:
+        """The nodes of the next look, over what the last one left to paths cheaper than ``aim``; None if that is
+        nothing, or if they are too far apart or lie over unknown ground."""
         plane, incumbent = self.work.plane, self.incumbent
         straight_m, most_m = sum(leg.straight_m for leg in plane.legs), plane.longest()
         first_m = min(SPACING_M, straight_m / LEAST_SECTIONS)
@@ -166,16 +173,18 @@ class SectionChains(Search):
         spans = widest = widest_spans(plane, lines, most_m)
         if looked is not None:
             incumbent.budget.spend("section", looked.pairs)
-            nodes = looked.nodes_left(incumbent.cost)
+            nodes = looked.nodes_left(aim)
             if len(lines) > len(looked.sections.lines):
                 limits = self.problem.bound_limits
                 least = min(limits.max_climb_slope, limits.max_descent_slope)
-                spare_m = (incumbent.cost - looked.bound) / planes.level
+                spare_m = (aim - looked.bound) / planes.level
                 spans = halved_spans(looked.sections, nodes, spare_m, least)
             else:
                 spans = looked.sections.spans_of(nodes)
             spans = spans_within(spans, widest)
             if not all(spans):
+                self._looked = None
+                incumbent.raise_bound(aim)
                 return None
         # Between two sections, a track gets aside by no more than what its metres to spare allow.
         window_m = 2.0 * math.sqrt((spacing_m + most_m - straight_m) ** 2 - spacing_m**2)
@@ -190,7 +199,7 @@ class _Look:
     """The cheapest chains over one set of nodes. ``bound``: of all paths that are cheaper than ``cost``."""
 
     def __init__(self, planes: Planes, sections: Sections, cost: float) -> None:
-        self.planes, self.sections = planes, sections
+        self.planes, self.sections, self.cost = planes, sections, cost
         # What rounding adds to the track, in expectation.
         step_m = sections.step_m
         self.less = planes.level * step_m**2 / 8.0 * float((1.0 / sections.gap).sum())
