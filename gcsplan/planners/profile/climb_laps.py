@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from itertools import islice
 
 import numpy as np
 
@@ -268,14 +269,12 @@ def _promising(problem: Problem, track: Track, lack: Lacking, length_m: float) -
     # Altitude reached by climbing to where the detour begins, or from which the descent after it begins.
     amsl = np.array([low + slope * min(abs(d.s0_m - low_s), abs(d.s1_m - low_s)) for d in found])
     above = (floor - amsl[:, None] - slope * along).max(axis=1) - FORGIVEN * why.by
-    out: list[_Detour] = []
-    for k in np.argsort(above.clip(0.0), kind="stable")[: 4 * TRIED]:
-        high = float(amsl[k]) + why.by
-        if np.isfinite(above[k]) and _fits(problem, found[k].shape, float(amsl[k]), high):
-            out.append(found[k])
-            if len(out) == TRIED:
-                break
-    return out
+    fitting = (
+        found[k]
+        for k in np.argsort(above.clip(0.0), kind="stable")[: 4 * TRIED]
+        if np.isfinite(above[k]) and _fits(problem, found[k].shape, float(amsl[k]), float(amsl[k]) + why.by)
+    )
+    return list(islice(fitting, TRIED))
 
 
 def _detours(problem: Problem, track: Track, low_s: float, high_s: float, length_m: float) -> Iterator[_Detour]:

@@ -175,9 +175,8 @@ class SectionChains(Search):
             incumbent.budget.spend("section", looked.pairs)
             nodes = looked.nodes_left(aim)
             if len(lines) > len(looked.sections.lines):
-                limits = self.problem.bound_limits
+                limits, spare_m = self.problem.bound_limits, (aim - looked.bound) / planes.level
                 least = min(limits.max_climb_slope, limits.max_descent_slope)
-                spare_m = (aim - looked.bound) / planes.level
                 spans = halved_spans(looked.sections, nodes, spare_m, least)
             else:
                 spans = looked.sections.spans_of(nodes)
@@ -201,8 +200,7 @@ class _Look:
     def __init__(self, planes: Planes, sections: Sections, cost: float) -> None:
         self.planes, self.sections, self.cost = planes, sections, cost
         # What rounding adds to the track, in expectation.
-        step_m = sections.step_m
-        self.less = planes.level * step_m**2 / 8.0 * float((1.0 / sections.gap).sum())
+        self.less = planes.level * sections.step_m**2 / 8.0 * float((1.0 / sections.gap).sum())
         self.most = cost + self.less
         self.value, self.near, self.pairs = self._swept(back=False)
         low, high = sections.low[-1], sections.high[-1]
