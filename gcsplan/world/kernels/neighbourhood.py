@@ -62,8 +62,7 @@ class LineBatch:
         return self._tiles
 
     def _met(self, grid: GridMap, field: Field, shape: tuple[int, ...]) -> Bools:
-        start, end = self._start[:, :2], self._end[:, :2]
-        spacing_m = SPACING * min(field.step_x, field.step_y)
+        start, end, spacing_m = self._start[:, :2], self._end[:, :2], SPACING * min(field.step_x, field.step_y)
         length = np.hypot(*(end - start).T)
         if length.any():
             parts = np.ceil(length / spacing_m).astype(np.intp) + 1
@@ -72,9 +71,7 @@ class LineBatch:
             t = nth / np.maximum(parts[line] - 1, 1)
             places = start[line] + t[:, None] * (end - start)[line]
         else:  # a raster: places in a row in one small square are as near to the first as on a line
-            square, new = np.floor(start / (spacing_m / 3.0)), np.ones(len(start), np.bool_)
-            new[1:] = (square[1:] != square[:-1]).any(axis=1)
-            places = start[new]
+            places = start[np.diff(np.floor(start / (spacing_m / 3.0)), axis=0, prepend=np.inf).any(axis=1)]
         cells = grid(*places.T)[:, ::-1] / TILE
         beside, most = (0.5 * SPACING + BOW) / TILE, np.array(shape) - 1.0
         low, high = (np.floor(cells + d).clip(0.0, most).astype(np.intp) for d in (-beside, beside))
