@@ -146,7 +146,7 @@ def test_places_of_a_raster_have_all_their_cells_looked_at(in_order: bool, monke
     whole = extrema_around(field, z, 4.0)
     monkeypatch.setattr(_neighbourhood, "LARGE_WINDOW", 1000)
     ours = Neighbourhood(grid, field, z, 4.0)
-    x, y = np.meshgrid(np.arange(330.0, 660.0, 3.0), -np.arange(10.0, 500.0, 3.0))
+    x, y = np.meshgrid(np.arange(60.0, 1900.0, 6.0), -np.arange(10.0, 500.0, 6.0))
     places = np.stack([x.ravel(), y.ravel()], axis=-1)
     places = places if in_order else rng.permutation(places)
     ours.along(LineBatch(places, places))
