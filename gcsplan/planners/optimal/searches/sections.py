@@ -175,7 +175,7 @@ class SectionChains(Search):
             incumbent.budget.spend("section", looked.pairs)
             nodes = looked.nodes_left(aim)
             if len(lines) > len(looked.sections.lines):
-                limits, spare_m = self.problem.bound_limits, (aim - looked.bound) / planes.level
+                limits, spare_m = self.problem.bound_limits, max(aim - looked.bound, 0.0) / planes.level
                 least = min(limits.max_climb_slope, limits.max_descent_slope)
                 spans = halved_spans(looked.sections, nodes, spare_m, least)
             else:
