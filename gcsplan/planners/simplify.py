@@ -8,6 +8,7 @@ until a point that it depends on moves, and the second leg of a move is checked 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,6 +24,9 @@ SHARE = 0.3
 """Part of the counted work left that the moves of one path may take: legs along a zone over a slope take long."""
 LAST_GAIN = 2e-6
 """A round that gains at most this part of the cost is the last."""
+
+WAY_POINT_PRICE = 2e-5
+"""The most that a path may become dearer for one way point less, as a part of its cost."""
 
 OPEN, LEGAL, SHUT = 0, 1, 2
 """State of a choice: not checked, all its legs are legal, or one of them is not."""
@@ -98,10 +102,11 @@ class _Choices:
     allowed: Bools
 
 
-def fewer(problem: Problem, points: Floats, pinned: Bools, worth: float) -> tuple[Floats, Bools]:
-    """Remove points: leave one out, or replace two by one (see `_choices`), cheapest first. All removals together may
-    cost at most ``worth``. Returns the points and which of them are ``pinned`` (which stay)."""
-    spent = 0.0
+def fewer(problem: Problem, points: Floats, pinned: Bools, most: float = math.inf) -> tuple[Floats, Bools]:
+    """Remove points: leave one out, or replace two by one (see `_choices`), cheapest first, under the exact check. Each
+    removal may cost `WAY_POINT_PRICE`, and all together ``most``, in the objective's unit. Returns the points and which
+    of them are ``pinned`` (which stay)."""
+    spent, price = 0.0, WAY_POINT_PRICE * problem.cost_through(points)
     came_from, marks = np.full(len(points), -1), np.zeros((0, 12), np.int8)
     while len(points) > 2:
         choices = _choices(points, pinned)
@@ -109,7 +114,7 @@ def fewer(problem: Problem, points: Floats, pinned: Bools, worth: float) -> tupl
         now = np.concatenate([[0.0], np.cumsum(problem.leg_costs(points[:-1], points[1:]))])
         extra = problem.leg_costs(points[first][:, None], mids) + problem.leg_costs(mids, points[last][:, None])
         extra -= (now[last] - now[first])[:, None]
-        cheap = choices.allowed & (np.maximum(extra, 0.0) + spent <= worth)
+        cheap = choices.allowed & (extra <= min(price, most - spent))
         marks = _still_known(marks, came_from)
         _look(problem, points, choices, cheap & (marks == OPEN), marks)
         extra[~(cheap & (marks == LEGAL))] = np.inf
@@ -121,7 +126,7 @@ def fewer(problem: Problem, points: Floats, pinned: Bools, worth: float) -> tupl
         points = points.copy()
         for row in np.argsort(more, kind="stable")[: np.count_nonzero(np.isfinite(more))].tolist():
             a, b, dearer = int(first[row]), int(last[row]), max(float(more[row]), 0.0)
-            if any(busy[a : b + 1]) or spent + dearer > worth:
+            if any(busy[a : b + 1]) or spent + dearer > most:
                 continue
             busy[a : b + 1] = bytes([1]) * (b + 1 - a)
             spent += dearer

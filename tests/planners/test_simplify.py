@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.problem import Objective, Problem
-from gcsplan.planners.simplify import fewer, polished, thinned
+from gcsplan.planners.simplify import WAY_POINT_PRICE, fewer, polished, thinned
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.geometry.limits import Limits
 from gcsplan.world.geometry.path import Path
@@ -131,6 +131,24 @@ def test_fewer_points_cost_no_more_than_was_allowed(seed: int, part: float, obje
     assert 2 <= len(points) <= len(before)
     assert len(still) == len(points)
     assert has_all(points, still, before, pinned)
+
+
+@pytest.mark.parametrize("objective", ["length", "energy"])
+@pytest.mark.parametrize("seed", seeds(1, 1, 4))
+def test_a_saved_way_point_costs_no_more_than_its_stated_price(seed: int, objective: Objective) -> None:
+    assert 0.0 < WAY_POINT_PRICE <= 5e-4
+    problem, crooked, pinned = zigzag(seed + 70, objective)
+    t = np.linspace(0.0, 1.0, 4, endpoint=False)[:, None]
+    legs = zip(crooked[:-1], crooked[1:], strict=True)
+    before = np.vstack([*(a + t * (b - a) for a, b in legs), crooked[-1]])
+    stay = np.zeros(len(before), np.bool_)
+    stay[::4] = pinned
+    points, still = fewer(problem, before, stay)
+    cost, saved = problem.cost(Path(before)), len(before) - len(points)
+    assert saved >= 3 * (len(crooked) - 1), "points on straight legs cost nothing"
+    assert clear(problem, points)
+    assert problem.cost(Path(points)) <= cost * (1.0 + WAY_POINT_PRICE * saved + 1e-12)
+    assert has_all(points, still, before, stay)
 
 
 def test_no_single_point_is_left_that_could_go_for_nothing() -> None:

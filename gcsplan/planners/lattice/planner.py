@@ -21,7 +21,6 @@ from gcsplan.planners.problem import Problem, Refusal, straight_way_m
 from gcsplan.planners.profile.climb_laps import pins_of, with_climbs
 from gcsplan.planners.profile.exact import LegJudge, Unsettled, settle
 from gcsplan.planners.profile.track import Obstruction, make_track
-from gcsplan.planners.simplify import fewer
 from gcsplan.world.geometry.path import Path, distances_m, track_length_m
 
 Tell = Callable[[str, float | None], None]
@@ -29,8 +28,8 @@ Tell = Callable[[str, float | None], None]
 COARSE_STEPS = (0.03, 0.015, 0.007, 0.0035)
 FINE_STEPS = (0.01, 0.004, 0.0015, 0.0006)
 """Sizes of the moves of a pull, as parts of the straight track."""
-COARSE_GAIN, FINE_GAIN, WORTH = 5e-5, 1e-5, 3e-5
-"""Least gain of a coarse and a fine move, and what fewer way points may cost, as parts of the straight track."""
+COARSE_GAIN, FINE_GAIN = 5e-5, 1e-5
+"""Least gain of a coarse and a fine move, as parts of the straight track."""
 CORRIDOR, CORRIDOR_STEPS = 0.08, 8.0
 """Half the width of the corridor around a track: as a part of the straight track, and at least in lattice steps."""
 NARROW, FINE_M = 0.02, 12.0
@@ -169,10 +168,6 @@ def _stopped_by(problem: Problem, why: Obstruction) -> str:
     return f"a {why.kind} steeper than max_{why.kind}_deg, by {why.by:.1f} m of height in {run_m:.0f} m"
 
 
-def _unit(problem: Problem) -> float:
-    return 1.0 if problem.rates is None else problem.rates[0]
-
-
 def sides_to_pass(problem: Problem, points: Floats, pinned: Bools, pin_m: Floats) -> dict[int, bool]:
     """For each zone within reach of a path, by index: whether the path passes over it."""
     track = make_track(problem, points[:, :2], pinned, pin_m)
@@ -242,9 +237,7 @@ class _Work:
         with self.problem.budget.allow(BETTER):
             best = self._best_line(tell)
         found, self.line = self._mended(best)
-        if isinstance(found, Unsettled):
-            return None
-        return fewer(self.problem, *found, WORTH * self.way_m * _unit(self.problem))[0]
+        return None if isinstance(found, Unsettled) else found[0]
 
     def _best_line(self, tell: Tell) -> GuidedTrack:
         """The best line of several tracks, after kicks."""

@@ -11,15 +11,15 @@ from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.budget import Budget
 from gcsplan.planners.optimal.plane.corridor import PinnedTrack
 from gcsplan.planners.problem import Problem, Progress, Solution, Step, passes_vias, straight_bound, straight_way_m
-from gcsplan.planners.profile.climb_laps import with_laps
+from gcsplan.planners.profile.climb_laps import pins_of, with_laps
 from gcsplan.planners.profile.exact import LegJudge, Unsettled, settle, way_points
 from gcsplan.planners.profile.track import Flown, Obstruction, Track, fly, make_track
 from gcsplan.planners.profile.zone_levels import may_pass
 from gcsplan.planners.simplify import fewer, polished
 from gcsplan.world.geometry.path import Path, track_length_m
 
-LITTLE, WORTH = 5e-6, 2e-5
-"""Part of the cost that removing way points may add: during the searches, and for the final path."""
+LITTLE = 5e-6
+"""Part of the cost that removing way points may add to a path during the searches."""
 HOPE = 1.5
 """A path is simplified only if it would become the best by gaining this many times the most that simplifying gained for
 a path of its kind so far."""
@@ -45,8 +45,8 @@ class Incumbent:
         self.nearer = NEARER * self.most_gap
         self.judge = LegJudge(problem)
         self.best: Floats | None = None
-        self.pinned: Bools | None = None
-        """(N,) which points of the best path are terminals; None if that is not known."""
+        self.pinned: Bools = np.zeros(0, np.bool_)
+        """(N,) which points of the best path are terminals."""
         self.cost = math.inf
         self.bound = straight_bound(problem) * (1.0 - 1e-12)
         self.track_m = straight_way_m(problem) * (1.0 - 1e-12)
@@ -111,12 +111,13 @@ class Incumbent:
 
     def take(self, points: Floats, pinned: Bools | None = None) -> bool:
         """Keep a path that passes the exact check if it is the best so far, and return whether it is; ``pinned`` (N,):
-        which points are terminals."""
+        which points are terminals (None: the ones at their places)."""
         cost = self.problem.cost(Path(points))
         if cost >= self.cost or not passes_vias(self.problem, points):
             return False
         self._first()
-        self.best, self.cost, self.pinned = points, cost, pinned
+        self.best, self.cost = points, cost
+        self.pinned = pins_of(self.problem, points)[0] if pinned is None else pinned
         self.tell("improve")
         return True
 
@@ -126,9 +127,8 @@ class Incumbent:
         self.bound = max(self.bound, min(other.bound, self.cost))
         if other.best is not None:
             self.take(other.best, other.pinned)
-            if other.pinned is not None:
-                straighter = fewer(self.problem, other.best, other.pinned, LITTLE * self.cost)
-                self.take(*polished(self.problem, *straighter))
+            straighter = fewer(self.problem, other.best, other.pinned, LITTLE * self.cost)
+            self.take(*polished(self.problem, *straighter))
 
     def offer(self, found: tuple[Floats, Bools] | None) -> bool:
         """`take` a path that a search made from legs it checked one by one, if it found one and the path as a whole
@@ -199,9 +199,14 @@ class Incumbent:
         return (self.cost - self.bound) / max(self.bound, 1e-9)
 
     def done(self) -> bool:
-        """Whether the gap to the reported bound is as small as requested; that bound is of paths whose ends may lie
-        beside the exact ones."""
-        return self.cost <= self.rounding.bound(self.bound) * (1.0 + self.most_gap)
+        """Whether the gap to the reported bound is as small as requested."""
+        return self.cost <= self.enough
+
+    @property
+    def enough(self) -> float:
+        """The greatest cost within the requested gap of the reported bound, which is of paths whose ends may lie beside
+        the exact ones."""
+        return self.rounding.bound(self.bound) * (1.0 + self.most_gap)
 
     def goes_on(self) -> bool:
         """Whether the gap is larger than requested, more bound is of use, and budget is left."""
@@ -234,11 +239,12 @@ class Incumbent:
             self.problem.progress(Progress(self.budget.elapsed_s, known, self.bound, phase, whole))
 
     def solution(self) -> Solution:
-        """The best path, with as few way points as `WORTH` allows, and the bound."""
+        """The best path, with the way points that are worth their price, and the bound. A requested gap that the path
+        meets stays met."""
         assert self.best is not None
-        if self.pinned is not None:
-            self.best, self.pinned = fewer(self.problem, self.best, self.pinned, WORTH * self.cost)
-            self.cost = self.problem.cost(Path(self.best))
+        most = self.enough - self.cost if self.done() else math.inf
+        self.best, self.pinned = fewer(self.problem, self.best, self.pinned, most)
+        self.cost = self.problem.cost(Path(self.best))
         self.tell("done")
         budget = self.budget
         return Solution(

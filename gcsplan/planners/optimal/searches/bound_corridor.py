@@ -114,7 +114,7 @@ def follow(plane: PlaneSearch) -> bool:
     incumbent = plane.incumbent
     if incumbent.best is None:
         return _first(plane)
-    terminals = [0, len(incumbent.best) - 1] if incumbent.pinned is None else np.flatnonzero(incumbent.pinned).tolist()
+    terminals = np.flatnonzero(incumbent.pinned).tolist()
     if len(terminals) != len(plane.legs) + 1:
         return False
     if incumbent.gap > FAR and plane.problem.objective == "length":
