@@ -8,11 +8,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
 from gcsplan.app.fleet.gates import waits_for_time
-from gcsplan.app.plan.model import Brief, VehiclePlan
+from gcsplan.app.plan.model import Brief, FleetPlan, VehiclePlan
 from gcsplan.app.plan.problem import built
 from gcsplan.app.plan.vehicle import rebuilt
 from gcsplan.errors import NoMission
@@ -21,6 +22,7 @@ from gcsplan.fleet.arrival import Crew, Hold, Mode, Schedule, schedule
 from gcsplan.fleet.intervals import Interval, steadiest
 from gcsplan.fleet.motion.timing import Course, flown_corners
 from gcsplan.fleet.resolve import NotSeparated
+from gcsplan.notes.note import Note
 from gcsplan.wind.drift import Drifts
 
 __all__ = [
@@ -166,6 +168,22 @@ def require_intervals(
         f"{when} {worst.second} arrives {apart} after {worst.first}, requested are {request}", least_s,
         frozenset(max(one.first, one.second, key=lambda name: drifts_of[name].most_s) for one in bad),
     )  # fmt: skip
+
+
+def schedule_in_wind(flown: Sequence[VehiclePlan], fleet: FleetPlan) -> list[Note]:
+    """The note on what the declared winds make of a time table: it holds in each, or nothing was requested of it."""
+    placed = sorted(((fleet.slot(v.name), v.verdict) for v in flown), key=lambda one: one[0].arrive_s)
+    known = [w for w in (verdict.arrive_window_s(slot) for slot, verdict in placed) if w is not None]
+    blown = [v.verdict.in_wind for v in flown]
+    if len(known) < 2 or all(one is None or one.wind.still for one in blown):  # departures alone make windows, too
+        return []
+    if fleet.in_every_wind and not any(drifts(v) for v in flown):
+        return [Note("schedule_in_every_wind")]
+    if fleet.in_every_wind:
+        off_s = max((one.off_s for one in fleet.intervals), default=0.0)
+        return [Note("schedule_kept_in_winds", off_s=off_s)]
+    over_s = [before[1] - after[0] for before, after in pairwise(known)]
+    return [Note("schedule_in_still_air", overlapping=sum(s > 0.0 for s in over_s), most_s=max(*over_s, 0.0))]
 
 
 def with_cures(why: NoMission, vehicles: Sequence[VehiclePlan], brief: Brief, again: Retimed) -> NoMission:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from itertools import pairwise
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -24,6 +23,7 @@ from gcsplan.app.fleet.every_wind import (
     in_every_wind,
     in_steadiest_order,
     require_intervals,
+    schedule_in_wind,
     steadier,
     with_cures,
 )
@@ -107,6 +107,9 @@ DRIFT_ROUNDS = 3
 MOST_CONFLICTS = 8
 """Most conflicts that a refusal or a note names."""
 
+_Left = tuple[tuple[tuple[VehiclePlan, ...], FleetPlan], LeavingOut]
+"""Who flies with its time table, and who is left out."""
+
 
 def finished(
     brief: Brief,
@@ -129,7 +132,7 @@ def finished(
     if len(flown) > 1 and source.arrival is None:
         notes.append(Note("no_arrival_asked"))
     notes += fleet.notes
-    notes += _schedule_in_wind(flown, fleet)
+    notes += schedule_in_wind(flown, fleet)
     if brief.objective == "energy" and any(not v.verdict.energy_stated for v in flown):
         flown = tuple(replace(v, verdict=replace(v.verdict, energy_stated=True, paper_energy=True)) for v in flown)
         notes.append(Note("paper_energy_minimised"))
@@ -137,22 +140,6 @@ def finished(
         source, brief.world, brief.planner, brief.objective, brief.seed, flown, tuple(notes), fleet,
         tuple(leaving.found), leaving.allowed,
     )  # fmt: skip
-
-
-def _schedule_in_wind(flown: Sequence[VehiclePlan], fleet: FleetPlan) -> list[Note]:
-    """The note on what the declared winds make of a time table: it holds in each, or nothing was requested of it."""
-    placed = sorted(((fleet.slot(v.name), v.verdict) for v in flown), key=lambda one: one[0].arrive_s)
-    known = [w for w in (verdict.arrive_window_s(slot) for slot, verdict in placed) if w is not None]
-    blown = [v.verdict.in_wind for v in flown]
-    if len(known) < 2 or all(one is None or one.wind.still for one in blown):  # departures alone make windows, too
-        return []
-    if fleet.in_every_wind and not any(drifts(v) for v in flown):
-        return [Note("schedule_in_every_wind")]
-    if fleet.in_every_wind:
-        off_s = max((one.off_s for one in fleet.intervals), default=0.0)
-        return [Note("schedule_kept_in_winds", off_s=off_s)]
-    over_s = [before[1] - after[0] for before, after in pairwise(known)]
-    return [Note("schedule_in_still_air", overlapping=sum(s > 0.0 for s in over_s), most_s=max(*over_s, 0.0))]
 
 
 def fleet_of(
@@ -203,29 +190,34 @@ def fleet_of(
     except NoMission as why:
         if not leaving.allowed:
             raise with_cures(why, vehicles, brief, again) from why
-    best: tuple[tuple[tuple[VehiclePlan, ...], FleetPlan], LeavingOut] | None = None
-    refusal: NoMission | None = None
+    return _fewest_left_out(vehicles, brief, gate, at_start, leaving)
+
+
+def _fewest_left_out(
+    vehicles: Sequence[VehiclePlan], brief: Brief, gate: GateTime | None, at_start: GateTime | None, leaving: LeavingOut
+) -> tuple[tuple[VehiclePlan, ...], FleetPlan]:
+    """`fleet_of` with the least number of gates with which the fewest vehicles are left out."""
+    arrival, found, refusal = brief.source.arrival, list[_Left](), NoMission("", reason="time")
+    assert arrival is not None
     for gates in counts(None if arrival.gates == "auto" and gate is None else arrival.gates):
         start = at_start if gates is None else gate
         try:
-            one = _leaving_out(vehicles, having(brief, gates), start, leaving.found)
+            found.append(_leaving_out(vehicles, having(brief, gates), start, leaving.found))
         except NoMission as why:
-            refusal = refusal or why
+            refusal = refusal if str(refusal) else why
             continue
-        if best is None or len(one[1].found) < len(best[1].found):
-            best = one
-        if len(one[1].found) == len(leaving.found) + 1:
+        if len(found[-1][1].found) == len(leaving.found) + 1:
             break  # not fewer, for with all it is refused
-    if best is None:
-        assert refusal is not None
+    if not found:
         raise refusal
-    leaving.found = best[1].found
-    return best[0]
+    flown, left = min(found, key=lambda one: len(one[1].found))
+    leaving.found = left.found
+    return flown
 
 
 def _leaving_out(
     vehicles: Sequence[VehiclePlan], brief: Brief, gate: GateTime | None, found: Sequence[LeftOut]
-) -> tuple[tuple[tuple[VehiclePlan, ...], FleetPlan], LeavingOut]:
+) -> _Left:
     """`fleet_of` without the vehicles that cannot keep the time table with these gates, and who is left out, ``found``
     included. Raises NoMission if none is left."""
     arrival = brief.source.arrival

@@ -377,7 +377,7 @@ class FlightInWind:
         least_s, most_s = self._held_s
         latest = earliest = self._seconds(slow_m_s)
         differ = np.zeros(latest.shape, dtype=np.bool_)
-        np.logical_or.at(differ, (..., self._parts.stretch), slow_m_s != fast_m_s)
+        np.logical_or.at(differ.T, self._parts.stretch, (slow_m_s != fast_m_s).T)
         if differ.any():
             # A leg ends in the turn to the next one.
             beside = differ.copy()

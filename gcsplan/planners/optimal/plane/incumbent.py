@@ -18,7 +18,7 @@ from gcsplan.planners.profile.zone_levels import may_pass
 from gcsplan.planners.simplify import fewer, polished
 from gcsplan.world.geometry.path import Path, track_length_m
 
-LITTLE = 5e-6
+STRAIGHTER = 5e-6
 """Part of the cost that removing way points may add to a path during the searches."""
 HOPE = 1.5
 """A path is simplified only if it would become the best by gaining this many times the most that simplifying gained for
@@ -99,10 +99,10 @@ class Incumbent:
         cost = self.problem.cost(Path(points))
         hope = self._gained.get((fine, longer), math.inf)
         as_given = fine, points.tobytes()
-        if as_given in self._simplified or cost > self.cost * (1.0 + HOPE * hope + LITTLE):
+        if as_given in self._simplified or cost > self.cost * (1.0 + HOPE * hope + STRAIGHTER):
             return False
         self._simplified.add(as_given)
-        points, pinned = fewer(self.problem, points, pinned, LITTLE * cost)
+        points, pinned = fewer(self.problem, points, pinned, STRAIGHTER * cost)
         if fine:
             points, pinned = polished(self.problem, points, pinned)
         gained = cost / max(self.problem.cost(Path(points)), 1e-9) - 1.0  # a level flight may cost nothing
@@ -127,7 +127,7 @@ class Incumbent:
         self.bound = max(self.bound, min(other.bound, self.cost))
         if other.best is not None:
             self.take(other.best, other.pinned)
-            straighter = fewer(self.problem, other.best, other.pinned, LITTLE * self.cost)
+            straighter = fewer(self.problem, other.best, other.pinned, STRAIGHTER * self.cost)
             self.take(*polished(self.problem, *straighter))
 
     def offer(self, found: tuple[Floats, Bools] | None) -> bool:
