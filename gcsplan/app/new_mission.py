@@ -73,7 +73,7 @@ def seen_at(url: str, sysid: int, autopilot: Autopilot | None) -> Seen:
     assert kind is not None
     start, notes = _start(state)
     height_m = return_on_board_m(values)
-    lean_deg = lean_on_board_deg(values) if kind is Autopilot.ARDUCOPTER else None
+    lean_deg = lean_on_board_deg(values)
     if not values:
         notes.append(Note("parameters_not_read"))
     return Seen(

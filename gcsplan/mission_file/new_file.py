@@ -24,7 +24,7 @@ from gcsplan.mission_file.values.schema import (
 )  # fmt: skip
 from gcsplan.mission_file.values.units import UNIT_SYMBOLS, unit_end
 from gcsplan.mission_file.zones.draft import one_line
-from gcsplan.vehicle import PX4_VEL_MAX_M_S, Autopilot
+from gcsplan.vehicle import DEFAULT_LEAN_DEG, PX4_TILT_DEG, PX4_VEL_MAX_M_S, Autopilot
 
 COMMENT_WIDTH = 100
 NEW_MIN_AGL_M = 60.0
@@ -155,10 +155,11 @@ def _vehicle(draft: Draft) -> Iterator[KeyRow]:
     height_m = draft.rtl_rel_home_m
     yield VehicleKeys, "rtl_rel_home_m", "100" if height_m is None else f"{height_m:.10g}", height_m is not None
     yield VehicleKeys, "speed_m_s", "[14, 20]" if wing else "[3, 10]", True
-    if draft.autopilot is Autopilot.ARDUCOPTER:
-        lean = draft.lean_deg
-        yield VehicleKeys, "lean_angle_deg", "30" if lean is None else f"{lean:.10g}", lean is not None
-    px4 = draft.autopilot is Autopilot.PX4
+    px4, lean_deg = draft.autopilot is Autopilot.PX4, draft.lean_deg
+    if draft.autopilot is not Autopilot.ARDUPLANE:
+        default_deg = PX4_TILT_DEG if px4 else DEFAULT_LEAN_DEG
+        leans_deg = default_deg if lean_deg is None else lean_deg
+        yield VehicleKeys, "lean_angle_deg", f"{leans_deg:.10g}", lean_deg is not None
     if px4:
         yield VehicleKeys, "mpc_xy_vel_max_m_s", f"{PX4_VEL_MAX_M_S:g}", False
     yield VehicleKeys, "climb_m_s", "3" if px4 else "2.5", True

@@ -126,6 +126,7 @@ PARAMETER_TABLES: dict[Autopilot, dict[str, StoredParameter]] = {
         "MPC_LAND_ALT1": _r(10.0),
         "MPC_LAND_ALT2": _r(5.0),
         "MPC_LAND_SPEED": _r(0.7),
+        "MPC_TILTMAX_AIR": _r(45.0),
         "MPC_TKO_SPEED": _r(1.5),
         "MPC_XY_CRUISE": _r(5.0),
         "MPC_XY_TRAJ_P": _r(0.5),

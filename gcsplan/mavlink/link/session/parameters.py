@@ -50,7 +50,7 @@ FENCE_GROUPS: dict[Autopilot, tuple[tuple[str, ...], ...]] = {
 } | {Autopilot.PX4: FENCE_DECIDES[Autopilot.PX4]}
 """Parameters that are read before a fence is sent."""
 
-_LEAN_ANGLE = {"ANGLE_MAX": 0.01, "ATC_ANGLE_MAX": 1.0}
+_LEAN_ANGLE = {"ANGLE_MAX": 0.01, "ATC_ANGLE_MAX": 1.0, "MPC_TILTMAX_AIR": 1.0}
 _RETURN_ENDS = {"RTL_ALT_FINAL": 100.0, "RTL_ALT_FINAL_M": 1.0}
 _SAME_DEG = 0.05
 _FLOWN_PITCH_DEG = 15.0  # TECS_PITCH_MAX, default
