@@ -21,7 +21,6 @@ from gcsplan.figures import floored, raised
 from gcsplan.fleet.arrival import Crew, Hold, Mode, Schedule, schedule
 from gcsplan.fleet.intervals import Interval, steadiest
 from gcsplan.fleet.motion.timing import Course, flown_corners
-from gcsplan.fleet.resolve import NotSeparated
 from gcsplan.notes.note import Note
 from gcsplan.wind.drift import Drifts
 
@@ -189,6 +188,8 @@ def schedule_in_wind(flown: Sequence[VehiclePlan], fleet: FleetPlan) -> list[Not
 def with_cures(why: NoMission, vehicles: Sequence[VehiclePlan], brief: Brief, again: Retimed) -> NoMission:
     """The refusal with what would do, each tried: a wider window, a longer interval, gates, lower speeds, a weaker wind
     or shorter windows of departure."""
+    from gcsplan.fleet.resolve import NotSeparated
+
     if len(vehicles) > MOST_TRIED or not (isinstance(why, NotInEveryWind) or why.reason == "separation"):
         return why
     if isinstance(why, NotSeparated) and why.goals_m is not None and why.interval_s is None:
