@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -140,7 +139,8 @@ def test_a_saved_way_point_costs_no_more_than_its_stated_price(seed: int, object
     assert 0.0 < WAY_POINT_PRICE <= 5e-4
     problem, crooked, pinned = zigzag(seed + 70, objective)
     t = np.linspace(0.0, 1.0, 4, endpoint=False)[:, None]
-    before = np.vstack([*(a + t * (b - a) for a, b in pairwise(crooked)), crooked[-1]])
+    legs = itertools.pairwise(crooked)
+    before = np.vstack([*(a + t * (b - a) for a, b in legs), crooked[-1]])
     stay = np.zeros(len(before), np.bool_)
     stay[::4] = pinned
     points, still = fewer(problem, before, stay)
