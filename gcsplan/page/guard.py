@@ -47,6 +47,9 @@ DROPPED = "dropped/"
 GOOD_SITES = (b"same-origin", b"none")
 """Values of Sec-Fetch-Site of the page's own requests, and of a user who opens it."""
 
+MOST_PATH = 1024
+"""Characters of a path; what reads numbers of it meets none that Python refuses to count."""
+
 REQUESTS_PER_S, BURST = 400.0, 800.0
 """Requests that are answered each second on average, and at once; the map asks for tiles by the dozen."""
 
@@ -166,7 +169,8 @@ class Guard:
         if any(site not in GOOD_SITES for site in given.get(b"sec-fetch-site", [])):
             return 403
         token = scope["path"].removeprefix("/").partition("/")[0]
-        if not secrets.compare_digest(token.encode("utf-8", "replace"), self.token.encode()):
+        known = secrets.compare_digest(token.encode("utf-8", "replace"), self.token.encode())
+        if not known or len(scope["path"]) > MOST_PATH:
             return 404
         if scope["type"] == "http" and scope["method"] not in ("GET", "HEAD"):
             dropped = scope["path"].removeprefix("/").partition("/")[2].startswith(DROPPED)

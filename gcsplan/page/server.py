@@ -261,6 +261,7 @@ def read_message(text: str) -> PageMessage:
     """A message of the page. Raises PageError for what is none."""
     try:
         message = json.loads(text, parse_constant=_no_number)
+        json.dumps(message, ensure_ascii=False).encode()  # raises for halves of surrogate pairs, which no file can hold
         deep = _depth(message) > MOST_DEPTH
     except (ValueError, RecursionError):
         raise PageError("a message is one object of JSON", code="bad_message") from None
@@ -284,7 +285,8 @@ def _depth(value: Any) -> int:
 
 
 def _json(answer: PageMessage) -> str:
-    return json.dumps(answer, ensure_ascii=False, separators=(",", ":"))
+    # In ASCII: a file's name may hold bytes that are no text, and what cannot be encoded would end the sending.
+    return json.dumps(answer, separators=(",", ":"))
 
 
 def _tile(data: bytes | None, media_type: str) -> Response:

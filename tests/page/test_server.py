@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import socket
 from collections.abc import Iterator
 from contextlib import suppress
@@ -114,7 +115,8 @@ def test_no_path_leads_to_another_file(server: MapServer, path: str) -> None:
 @pytest.mark.parametrize(
     ("path", "status"),
     [("terrain/1/12/2144/1455.png", 200), ("terrain/99/12/2144/1455.png", 404), ("terrain/1/30/0/0.png", 404),
-     ("terrain/1/12/99999/0.png", 404), (f"terrain/1/12/{'9' * 40}/0.png", 404), ("base/1/0/0", 404)],
+     ("terrain/1/12/99999/0.png", 404), (f"terrain/1/12/{'9' * 40}/0.png", 404), ("base/1/0/0", 404),
+     (f"terrain/1/12/{'9' * 5000}/0.png", 404), (f"base/{'9' * 5000}/0/0", 404)],
 )  # fmt: skip
 def test_tiles_are_there_or_are_not(server: MapServer, path: str, status: int) -> None:
     with Page(server) as page:
@@ -134,7 +136,8 @@ def test_a_request_of_endless_headers_is_cut_off(server: MapServer) -> None:
 BAD = [
     "", "{", "[]", "1", "null", '{"type":1,"n":1}', '{"type":"hello"}', '{"type":"hello","n":-1}',
     '{"type":"hello","n":true}', '{"type":"hello","n":1e400}', '{"type":"hello","n":NaN}', "[" * 5000,
-    "[" * 900 + "]" * 900, json.dumps({"type": "change", "n": 1, "changes": {"a": [[[[[[[[[[[[[[1]]]]]]]]]]]]]]}}),
+    "[" * 900 + "]" * 900, '{"type":"hello","n":1,"x":"\\ud83d"}',
+    json.dumps({"type": "change", "n": 1, "changes": {"a": [[[[[[[[[[[[[[1]]]]]]]]]]]]]]}}),
 ]  # fmt: skip
 
 
@@ -150,6 +153,18 @@ def test_broken_messages_are_answered_in_words_and_change_nothing(server: MapSer
         assert page.until("error")["code"] == "bad_message"
         page.send("hello")
         assert page.until("state")["vehicles"] == before
+
+
+@pytest.mark.slow
+def test_a_file_whose_name_is_no_text_does_not_end_the_answers(server: MapServer, folder: Path) -> None:
+    (folder / os.fsdecode(b"\xff.tif")).write_bytes(b"")
+    try:
+        with Page(server) as page:
+            for _ in range(2):
+                page.send("hello")
+                assert os.fsdecode(b"\xff.tif") in page.until("state")["files"]
+    finally:
+        (folder / os.fsdecode(b"\xff.tif")).unlink()
 
 
 BAD_CHANGES: list[Any] = [

@@ -93,9 +93,10 @@ def may_be_zones(name: str) -> bool:
 
 def safe_name(given: str) -> str:
     """A name for the mission's folder: the last part of ``given``, with letters, digits, blanks, _ - . alone."""
-    plain = re.sub(r"[^\w.-]+", "_", re.split(r"[/\\]", given)[-1], flags=re.ASCII).lstrip("._-")
+    plain = re.sub(r"[^\w.-]+", "_", re.split(r"[/\\]", given)[-1], flags=re.ASCII)
     stem, dot, ending = plain.rpartition(".")
-    return f"{stem[: MOST_NAME - len(ending) - 1]}{dot}{ending}"[:MOST_NAME] or "file"
+    kept = stem.lstrip("._-") or ("file" if "_" in stem else "")  # a name in another script keeps its ending
+    return f"{kept[: max(MOST_NAME - len(ending) - 1, 0)]}{dot}{ending}".lstrip("._-")[:MOST_NAME] or "file"
 
 
 def most_bytes(name: str) -> int:

@@ -15,7 +15,8 @@ from gcsplan.page.dropped.shelf import Dropped, Shelf, endings, has_other, laid_
     ("given", "name"),
     [("../../etc/zones.kml", "zones.kml"), (r"C:\maps\zones.kml", "zones.kml"), (".bashrc.kml", "bashrc.kml"),
      ("Zonen München (2).kml", "Zonen_M_nchen_2_.kml"), ("", "file"), ("/", "file"), ("a\0b\n.kml", "a_b_.kml"),
-     ("x" * 300 + ".kml", "x" * 92 + ".kml"), ("-rf.plan", "rf.plan")],
+     ("x" * 300 + ".kml", "x" * 92 + ".kml"), ("-rf.plan", "rf.plan"),
+     ("зоны.geojson", "file.geojson"), ("地形.tif", "file.tif"), ("a." + "b" * 200, "b" * 96)],
 )  # fmt: skip
 def test_a_name_has_no_folder_and_plain_letters(given: str, name: str) -> None:
     assert safe_name(given) == name
