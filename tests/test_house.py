@@ -358,7 +358,7 @@ MOST_IN_A_FOLDER = 15
 
 MOST = {
     "modules": 506,
-    "statements": 73_471,
+    "statements": 73_476,
     "type names with two meanings": 0,
     "constants with two values": 1,
     "folders with more than 15 modules": 0,

@@ -185,15 +185,20 @@ def schedule_in_wind(flown: Sequence[VehiclePlan], fleet: FleetPlan) -> list[Not
     return [Note("schedule_in_still_air", overlapping=sum(s > 0.0 for s in over_s), most_s=max(*over_s, 0.0))]
 
 
+def goals_too_near(why: NoMission) -> bool:
+    """Whether goals are so near that no departure, speed or path helps; the refusal says how far apart they must be."""
+    from gcsplan.fleet.resolve import NotSeparated
+
+    return isinstance(why, NotSeparated) and why.goals_m is not None and why.interval_s is None
+
+
 def with_cures(why: NoMission, vehicles: Sequence[VehiclePlan], brief: Brief, again: Retimed) -> NoMission:
     """The refusal with what would do, each tried: a wider window, a longer interval, gates, lower speeds, a weaker wind
     or shorter windows of departure."""
-    from gcsplan.fleet.resolve import NotSeparated
-
     if len(vehicles) > MOST_TRIED or not (isinstance(why, NotInEveryWind) or why.reason == "separation"):
         return why
-    if isinstance(why, NotSeparated) and why.goals_m is not None and why.interval_s is None:
-        return why  # goals so near that no departure, speed or path helps; it says how far apart they must be
+    if goals_too_near(why):
+        return why
     found = [
         *_windows(why, vehicles, brief, again),
         *_gates(vehicles, brief, again),

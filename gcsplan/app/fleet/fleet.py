@@ -20,6 +20,7 @@ from gcsplan.app.fleet.every_wind import (
     at_speeds,
     corners_cut_m,
     drifts,
+    goals_too_near,
     in_every_wind,
     in_steadiest_order,
     require_intervals,
@@ -181,6 +182,8 @@ def fleet_of(
                 try:
                     return _fleet_of(tried, having(terms, gates), start, LeavingOut(allowed=False), pace, steady)
                 except NoMission as why:
+                    if goals_too_near(why):
+                        raise
                     if isinstance(why, NotInEveryWind) or not isinstance(refusal, NotInEveryWind):
                         refusal = why
         raise refusal
