@@ -261,7 +261,6 @@ def read_message(text: str) -> PageMessage:
     """A message of the page. Raises PageError for what is none."""
     try:
         message = json.loads(text, parse_constant=_no_number)
-        json.dumps(message, ensure_ascii=False).encode()  # raises for halves of surrogate pairs, which no file can hold
         deep = _depth(message) > MOST_DEPTH
     except (ValueError, RecursionError):
         raise PageError("a message is one object of JSON", code="bad_message") from None
