@@ -197,7 +197,10 @@ def test_a_text_is_one_step_with_its_comments_and_lasts_without_a_save(desk: Des
         assert (state["restored"], state["vehicles"][0]["goal"]) == (True, [46.511, 8.51])
         assert "# by hand" in again.ask("text", "text")["text"]
         state = again.ask("undo", "state")
+        assert (state["saved"], again.ask("text", "text")["text"]) == (False, text)
+        state = again.ask("undo", "state")
         assert (state["saved"], again.ask("text", "text")["text"]) == (True, FLAT)
+        again.ask("redo", "state")
         again.ask("redo", "state")
         again.ask("save", "saved")
     assert "35}   # by hand" in file.read_text()
