@@ -245,8 +245,8 @@ def upload(
     Returns one `JobResult` per vehicle, in the plan's order: ``verified`` is True only if the mission was read back and
     equals what was sent; ``message`` says what went wrong. A failure of one vehicle does not affect the others and
     raises nothing; `gcsplan.app.upload.run.exit_code` sums them up. Raises UsageError for bad targets and for a common
-    start that is past, near or far, and, before
-    anything is sent, CheckFailed if a verdict does not pass, or a return with ``way_home: required``.
+    start that is past, near or far, and, before anything is sent, CheckFailed if a verdict does not pass, or a return
+    with ``way_home: required``.
     """
     require(
         "upload", planned=planned, to=to, timeout_s=timeout_s, progress=progress, atomic=atomic,
@@ -259,7 +259,7 @@ def upload(
         words = (
             [to] if isinstance(to, str) else list(elements("upload()", "to", to, str, "a URL, or a list of NAME=URL"))
         )
-    GateTime.require_of(None if planned.fleet is None else planned.fleet.start_utc)
+    GateTime.require_of(planned)
     targets = uploads.targets(words, [v.request.vehicle for v in planned.vehicles])
     require_passing({v.name: v.verdict for v in planned.vehicles if v.name in targets}, allow_unjudged=allow_unjudged)
     homes = returns.judged(planned, home=False)

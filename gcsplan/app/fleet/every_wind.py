@@ -12,7 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from gcsplan.app.fleet.gates import waits_for_time
+from gcsplan.app.fleet.gates import having, waits_for_time
 from gcsplan.app.plan.model import Brief, FleetPlan, VehiclePlan
 from gcsplan.app.plan.problem import built
 from gcsplan.app.plan.vehicle import rebuilt
@@ -29,9 +29,11 @@ __all__ = [
     "at_speeds",
     "corners_cut_m",
     "drifts",
+    "goals_too_near",
     "in_every_wind",
     "in_steadiest_order",
     "require_intervals",
+    "schedule_in_wind",
     "steadier",
     "with_cures",
 ]
@@ -195,9 +197,8 @@ def goals_too_near(why: NoMission) -> bool:
 def with_cures(why: NoMission, vehicles: Sequence[VehiclePlan], brief: Brief, again: Retimed) -> NoMission:
     """The refusal with what would do, each tried: a wider window, a longer interval, gates, lower speeds, a weaker wind
     or shorter windows of departure."""
-    if len(vehicles) > MOST_TRIED or not (isinstance(why, NotInEveryWind) or why.reason == "separation"):
-        return why
-    if goals_too_near(why):
+    curable = isinstance(why, NotInEveryWind) or (why.reason == "separation" and not goals_too_near(why))
+    if len(vehicles) > MOST_TRIED or not curable:
         return why
     found = [
         *_windows(why, vehicles, brief, again),
@@ -259,7 +260,7 @@ def _gates(vehicles: Sequence[VehiclePlan], brief: Brief, again: Retimed) -> lis
     if arrival.gates not in (None, "auto") or not any(waits_for_time(v.request.vehicle) for v in vehicles):
         return []
     for count in range(1, CURE_TRIES + 1):
-        if _works(again, vehicles, _with(brief, arrival=replace(arrival, gates=count))):
+        if _works(again, vehicles, having(brief, count)):
             return [f"gates: {count} with a common start (--gate-utc)"]
     return []
 

@@ -200,19 +200,19 @@ def _fewest_left_out(
     vehicles: Sequence[VehiclePlan], brief: Brief, gate: GateTime | None, at_start: GateTime | None, leaving: LeavingOut
 ) -> tuple[tuple[VehiclePlan, ...], FleetPlan]:
     """`fleet_of` with the least number of gates with which the fewest vehicles are left out."""
-    arrival, found, refusal = brief.source.arrival, list[_Left](), NoMission("", reason="time")
+    arrival, found, refusals = brief.source.arrival, list[_Left](), list[NoMission]()
     assert arrival is not None
     for gates in counts(None if arrival.gates == "auto" and gate is None else arrival.gates):
         start = at_start if gates is None else gate
         try:
             found.append(_leaving_out(vehicles, having(brief, gates), start, leaving.found))
         except NoMission as why:
-            refusal = refusal if str(refusal) else why
+            refusals.append(why)
             continue
         if len(found[-1][1].found) == len(leaving.found) + 1:
             break  # not fewer, for with all it is refused
     if not found:
-        raise refusal
+        raise refusals[0]
     flown, left = min(found, key=lambda one: len(one[1].found))
     leaving.found = left.found
     return flown

@@ -12,6 +12,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
+from typing import TYPE_CHECKING
 
 from gcsplan.errors import InputError, UsageError
 from gcsplan.fleet.arrival import Crew, Slot
@@ -19,6 +20,9 @@ from gcsplan.fleet.motion.timing import Course
 from gcsplan.mission_file.published.times import begins_with_day
 from gcsplan.mission_file.request import MissionFile
 from gcsplan.vehicle import Autopilot
+
+if TYPE_CHECKING:
+    from gcsplan.app.plan.model import Plan
 
 NEAREST_S = 60.0
 """Seconds by which the common start must be ahead at least, when it is requested and when it is sent."""
@@ -45,10 +49,10 @@ class GateTime:
         return cls(source.departure.astimezone(UTC).replace(microsecond=0), "at")
 
     @classmethod
-    def require_of(cls, start_utc: datetime | None) -> None:
+    def require_of(cls, plan: Plan) -> None:
         """Raise UsageError unless the common start of a plan, if it has one, is ahead now: before it is handed out."""
-        if start_utc is not None:
-            cls(start_utc, "the common start").require_ahead(datetime.now(UTC))
+        if plan.fleet is not None and plan.fleet.start_utc is not None:
+            cls(plan.fleet.start_utc, "the common start").require_ahead(datetime.now(UTC))
 
     @classmethod
     def parse(cls, text: str, now: datetime) -> GateTime:

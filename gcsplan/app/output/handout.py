@@ -68,7 +68,7 @@ def handout(
     ``earlier`` has missions that it is compared with. With ``home`` the ways home are judged. Raises CheckFailed,
     NoMission or InputError for a plan that must not be handed out.
     """
-    GateTime.require_of(None if plan.fleet is None else plan.fleet.start_utc)
+    GateTime.require_of(plan)
     planned, homes = flyable(plan, allow_unjudged=allow_unjudged, home=home, require_way_home=require_way_home)
     if any(way.safe is False for way in homes.values()):
         from gcsplan.app.fleet.earlier_landing import with_earlier_landing

@@ -107,7 +107,7 @@ class FlightTimes:
         flights: tuple[int, ...] = () if ground_m_s is None else ground_m_s.shape[:-1]
         if ground_m_s is not None and flights and not lays(self.vehicle):
             return np.array([self.seconds(one) for one in ground_m_s])
-        seconds, done = np.tile(self._columns_s, (*flights, 1)) if flights else self._columns_s.copy(), 0
+        seconds, done = np.tile(self._columns_s, (*flights, 1)), 0
         for run in self._runs:
             count = len(run.owner)
             wind = None if ground_m_s is None else ground_m_s[..., done : done + count]

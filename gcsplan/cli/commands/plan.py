@@ -509,8 +509,8 @@ def _upload(handed: Handout, **options: Any) -> list[JobResult]:
     from gcsplan.cli.output.console import transfer_progress
     from gcsplan.sim.vehicle.server import loopback_fleet
 
-    fleet, jobs = handed.plan.fleet, handed.jobs
-    GateTime.require_of(None if fleet is None else fleet.start_utc)  # planning took time, so check again
+    GateTime.require_of(handed.plan)  # planning took time, so check again
+    jobs = handed.jobs
     names = [job.name for job in jobs]
     with talking(names), transfer_progress(names) as moved_on:
         return uploads.run_jobs(jobs, UploadOptions(**options), moved_on, simulator=loopback_fleet)

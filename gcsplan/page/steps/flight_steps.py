@@ -250,8 +250,7 @@ class PageSteps:
     def _sent(self, n: int, ticket: _Ticket) -> PageMessage:
         handed, names = ticket.handed, [job.name for job in ticket.handed.jobs]
         folder = ticket.shown.folder
-        fleet = handed.plan.fleet
-        GateTime.require_of(None if fleet is None else fleet.start_utc)
+        GateTime.require_of(handed.plan)
         self._send(self._written(n, folder, handed))
         progress = _Progress(n, self._send)
         try:
