@@ -93,7 +93,7 @@ def test_without_an_energy_key_no_output_tells_an_energy(capsys: pytest.CaptureF
         assert ("<dt>energy</dt><dd>–" in report_of(done)) is not told
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_battery_without_energy_is_judged_by_the_papers_numbers_and_says_so(
     capsys: pytest.CaptureFixture[str],
 ) -> None:

@@ -110,7 +110,7 @@ def test_a_planned_fleet_arrives_within_half_a_second_of_its_plan_in_order_and_a
     assert result.closest.distance_m > 30.0
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_late_vehicle_is_judged_by_its_own_departure_and_the_fleet_by_its_plan(planned: Plan) -> None:
     late = rehearse(planned, late_s={"uav1": 5.0})
     assert (late.intervals_kept_runs, late.order_kept_runs) == (0, 1)

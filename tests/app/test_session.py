@@ -301,7 +301,7 @@ def run_threads(threads: int, changes: int) -> None:
         assert got == figures(alone.plan(changes_of(k, n)))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_threads_get_the_plans_that_they_would_get_alone() -> None:
     run_threads(6, 3)
 

@@ -16,7 +16,7 @@ from gcsplan.mission_file import load_mission
 from tests.fleet.test_separation import random_fleet
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_mission_is_a_fleet_with_places_apart_and_each_system_id_once_on_a_link() -> None:
     document = fleet_document(1000)
     source = load_mission(document)

@@ -60,7 +60,7 @@ def test_a_bound_above_the_plans_own_cost_is_found() -> None:
     assert kinds(raised(lambda v: v.cost * (1.0 + 1e-6)), "walls", 2, 1) & {"own cost", "crash"}
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_false_proof_is_found_by_a_way_past_the_walls() -> None:
     assert "proved" in kinds(refused("there is no path within the limits, which is proved"), "walls", 1, 60)
 

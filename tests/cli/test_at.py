@@ -146,7 +146,7 @@ def test_upload_and_verify_refuse_a_flight_beyond_the_hours(call: Run, url: str)
     assert call("verify", "short.waypoints", "--to", url, "--at", TUESDAY)[0] == 2
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_plan_batch_and_rehearse_take_the_option(call: Run) -> None:
     assert call("plan", "m.yaml", "-o", "out")[0] == 2  # the start lies inside the zone
     assert call("plan", "m.yaml", "-o", "out", "--at", TUESDAY)[0] == 0

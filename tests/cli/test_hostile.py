@@ -107,6 +107,7 @@ def test_spoilt_mission_files_end_in_a_message(run: Run, tmp_path: Path) -> None
     assert ends(codes) == {"judged", "refused"}
 
 
+@pytest.mark.nightly
 def test_spoilt_waypoints_and_plans_end_in_a_message(run: Run, tmp_path: Path) -> None:
     rng, codes = random.Random(2), set[int]()
     plain = (tmp_path / "uav1.waypoints").read_bytes()

@@ -154,6 +154,7 @@ def test_what_is_piped_is_the_table_and_a_reader_that_goes_away_is_no_bug(run: A
     assert {p.name: p.read_bytes() for p in (tmp_path / "out").iterdir()} == whole
 
 
+@pytest.mark.nightly_but("--help-0", "planners-0")
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "code"), [("--help", 0), ("planners", 0), ("plan sample:nope", 2), ("plan sample:nope --json", 2)]

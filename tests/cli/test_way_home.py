@@ -195,6 +195,7 @@ def test_where_a_safe_return_is_required_nothing_flyable_is_left_and_nothing_is_
     assert not flyable(tmp_path / "script")
 
 
+@pytest.mark.nightly_but("upload")
 @pytest.mark.slow
 @pytest.mark.parametrize("way", ["plan", "upload"])
 def test_a_vehicle_with_another_return_altitude_is_refused_before_anything_is_sent(

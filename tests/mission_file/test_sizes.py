@@ -41,7 +41,7 @@ def said(kind: str, count: int) -> str:
         return "\n".join(str(p) for p in refusal.problems)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_an_outline_of_99_000_spikes_is_refused_by_its_name(within_s: list[float]) -> None:
     within_s.append(8.0)  # minutes before
     assert "features[0].geometry.coordinates: the outline has 99000 corners" in said("corners", 99_000)
@@ -74,7 +74,7 @@ def test_ten_thousand_arcs_are_counted_before_they_are_drawn(within_s: list[floa
     assert "its outline has 10000 points and arcs, drawn with" in said("arcs", 10_000)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_where_half_a_metre_does_not_help_the_message_says_what_would(within_s: list[float]) -> None:
     within_s.append(20.0)
     assert "its outline has 28000 corners, more than 20000; simplify it: drawn up to 1 m wider it has" in said(

@@ -430,7 +430,7 @@ def paths_into(value: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
     return found
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.draws
 def test_any_geojson_gives_zones_or_clear_problems(tmp_path: Path) -> None:
     assert draw_attacks(200, partial(spoilt_geojson, tmp_path / "z.geojson")) == {"zones", "problems"}

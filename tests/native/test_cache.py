@@ -24,7 +24,7 @@ def test_kept_code_that_is_spoilt_is_compiled_again(room: Path) -> None:
     assert kept.read_bytes() == whole
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_without_a_cache_to_write_to_kernels_are_compiled_each_time(room: Path) -> None:
     (room / "cache").write_text("a file where the folder should be", encoding="utf-8")
     ship(kernels(room))

@@ -89,6 +89,7 @@ def has_all(points: Floats, pinned: Bools, before: Floats, pinned_before: Bools)
     return np.array_equal(points[pinned], before[pinned_before])
 
 
+@pytest.mark.nightly_but("1-energy", "3-length")
 @pytest.mark.slow
 @pytest.mark.parametrize("objective", ["length", "energy"])
 @pytest.mark.parametrize("seed", range(6))

@@ -59,6 +59,7 @@ def kinds(airspace: Airspace, legs: Legs, limits: Limits) -> set[str]:
 # --- heights over the ground -----------------------------------------------------------------------------------------
 
 
+@pytest.mark.nightly_but("3", "0")
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(6))
 def test_a_leg_from_border_to_border_through_a_polygon_is_seen(seed: int) -> None:

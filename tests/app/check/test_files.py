@@ -84,7 +84,7 @@ def test_files_without_a_home_are_judged_with_the_one_that_is_given(folder: Path
     assert all("home" in error.message for _, error in batch.unreadable)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_plans_for_px4_are_judged_as_planted(folder: Path, options: WorldOptions) -> None:
     written = corpus.write(folder, corpus.PX4)
     assert amiss(written, with_options(options, None, list(written))) == []
@@ -451,7 +451,7 @@ def test_each_sentence_of_json_has_its_code_and_data(run: Any, folder: Path, wor
     assert low["data"]["by_m"] == low["by"]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_without_a_mission_file_the_options_are_named_and_with_one_its_keys(
     run: Any, folder: Path, world: list[str]
 ) -> None:

@@ -338,7 +338,7 @@ def test_copters_give_up_speed_only_where_a_declared_wind_changes_a_time(lean_de
     assert [round(one["least_s"], 3) for one in summary_of(done)["fleet"]["intervals"]] == [20.0]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_fleet_that_asks_for_no_arrival_is_timed_in_still_air() -> None:
     done = planned(None, {"lean_angle_deg": 30}, {"lean_angle_deg": 30}, wind={"up_to_m_s": 4})
     assert "schedule_in_still_air" in [n.code for n in done.notes]

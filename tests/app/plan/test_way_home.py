@@ -101,7 +101,7 @@ def test_where_no_path_back_is_written_one_message_says_why(vehicle: dict[str, A
         planned(return_route="mission", **vehicle)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_path_back_keeps_the_descent_limit_where_the_way_out_climbs() -> None:
     asked = WALL | {
         "terrain": {"flat_m": 0, "peaks": [{"center": [1000, 0], "height_m": 300, "decay_m": [300, 900]}]},

@@ -126,6 +126,7 @@ def test_at_the_lowest_altitude_it_is_safe_and_a_little_below_it_is_not(autopilo
     assert judged(w, m, v, lowest - 1.2).safe is False
 
 
+@pytest.mark.nightly_but("arducopter")
 @pytest.mark.slow
 @pytest.mark.parametrize("autopilot", [Autopilot.ARDUCOPTER, Autopilot.ARDUPLANE])
 def test_lines_home_that_are_judged_a_few_at_once_give_the_same(

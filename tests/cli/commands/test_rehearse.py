@@ -33,7 +33,7 @@ def test_the_command_prints_one_document_and_its_code(file: Path, capsys: pytest
     assert "error" not in document
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_violation_ends_the_command_with_four_and_is_said_in_both_ways(
     file: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -59,7 +59,7 @@ def test_a_plan_that_is_sent_nowhere_imports_nothing_of_what_sends_or_draws(tmp_
     assert imported_by("plan", str(CROSSING), "-o", str(tmp_path / "out")) & SENDS_OR_DRAWS == set()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_leg_over_flat_ground_imports_no_file_reader_and_no_separation(tmp_path: Path) -> None:
     mission = tmp_path / "flat.yaml"
     mission.write_text(FLAT)

@@ -20,7 +20,7 @@ def fits(cm: np.ndarray, up: np.ndarray, down: np.ndarray) -> bool:
     return bool((rise <= up).all() and (-rise <= down).all())
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @settings(max_examples=draws(300))
 @given(LEGS, st.integers(0, 31))
 def test_the_altitudes_that_are_moved_least_are_found(legs: list[tuple[float, float, float]], mask: int) -> None:

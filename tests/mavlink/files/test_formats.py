@@ -93,7 +93,7 @@ def missions(draw: st.DrawFn, *, nan: bool = False) -> Mission:
     return Mission(autopilot, Home(draw(lat_e7), draw(lon_e7), amsl), tuple(items))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @settings(max_examples=draws(80))
 @given(missions())
 def test_a_waypoints_file_reads_back_as_the_same_mission(mission: Mission) -> None:
@@ -104,7 +104,7 @@ def test_a_waypoints_file_reads_back_as_the_same_mission(mission: Mission) -> No
     assert wire(held.mission) == wire(mission)  # a file that lies on no disk
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @settings(max_examples=draws(80))
 @given(missions(nan=True))
 def test_a_plan_file_reads_back_as_the_same_mission(mission: Mission) -> None:

@@ -63,7 +63,7 @@ def typed_by_hand(source: str) -> list[int]:
     return found
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_no_command_is_typed_as_a_number() -> None:
     assert typed_by_hand("x = item.command in (5001, RALLY)\ny = MissionItem(16, 3)\nz = item.command == WAYPOINT") == [
         1,

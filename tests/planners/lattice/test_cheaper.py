@@ -70,7 +70,7 @@ def test_a_chain_through_a_wall_is_pulled_to_no_path() -> None:
     assert pulled(p, LegJudge(p), chain, np.array([True, False, False, True]), np.full(4, np.nan)) is None
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_path_that_climbs_aslant_is_better_than_one_with_laps() -> None:
     p = under_a_lid()
     below = looked(p).incumbent

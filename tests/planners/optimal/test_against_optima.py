@@ -173,6 +173,7 @@ def test_bound_holds_for_the_path_of_the_mission_flown_backwards(family: str) ->
         assert other.lower_bound <= problem.cost(one.path) + touch, seed
 
 
+@pytest.mark.nightly_but("0.0")
 @pytest.mark.parametrize("budget_s", [0.0, 0.02])
 def test_bound_holds_however_soon_the_planner_is_stopped(budget_s: float) -> None:
     wrong = [

@@ -39,6 +39,7 @@ def ends(track: Floats) -> Floats:
     return np.isin(np.arange(len(track)), [0, len(track) - 1])
 
 
+@pytest.mark.nightly_but("0-disc")
 @pytest.mark.slow
 @pytest.mark.parametrize("shape", ["disc", "polygon"])
 @pytest.mark.parametrize("seed", seeds(2, 2, 4))

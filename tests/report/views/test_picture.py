@@ -29,7 +29,7 @@ def test_each_figure_is_drawn_as_a_png_too() -> None:
         assert image.width > 800
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_no_label_of_the_map_lies_on_another() -> None:
     page = page_of_plan(planned())
     figure = draw(page)

@@ -80,6 +80,7 @@ def test_a_steep_leg_is_flown_as_slowly_as_climb_and_descent_demand(rise_m: floa
     assert flown.arrive_s[0] == pytest.approx(300 / 2.5 + 2.5 + length_m / v + v / 1.5, abs=0.05)
 
 
+@pytest.mark.nightly_but("38.8-6.93", "60.7-9.2")
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("leg_m", "measured_m_s"),

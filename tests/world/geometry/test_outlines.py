@@ -69,7 +69,7 @@ def test_crossings_are_counted_twice_and_only_so_far() -> None:
     assert crossings(np.random.default_rng(1).uniform(0.0, 1.0, (90_000, 2))) > MOST_CROSSINGS
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_an_outline_that_would_take_minutes_is_refused_at_once() -> None:
     begun = time.process_time()
     ring, why = outline_of([(n / 1e5, e / 1e5) for e, n in ring_of("spiky", 99_000, 1).tolist()])

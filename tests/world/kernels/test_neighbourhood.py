@@ -62,6 +62,7 @@ def in_rows(extrema: LocalExtrema, z: Floats) -> tuple[Floats, Floats, Floats]:
     return slope, high, low
 
 
+@pytest.mark.nightly_but("10", "5")
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(12))
 def test_it_bounds_all_that_is_around_and_hardly_more(seed: int) -> None:
@@ -204,7 +205,7 @@ def test_what_was_not_looked_at_is_unknown(monkeypatch: pytest.MonkeyPatch) -> N
     assert np.isinf(blind.tube(np.concatenate([a, b])[:, :2], limits).floor_m).all()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_neighbourhoods_forget_those_asked_for_least_lately_and_judge_alike(monkeypatch: pytest.MonkeyPatch) -> None:
     """A way home asks for many reaches: those of 40 million cells took 4 GB."""
     rng = np.random.default_rng(5)

@@ -47,7 +47,7 @@ def test_no_ground_lies_outside_the_two_heights_at_twenty_thousand_places(name: 
     assert run(layout, tmp_path, 20_000, 11).wrong == 0
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_oracle_sees_a_seam_that_is_judged_by_one_height(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The finest heights alone, as a merge would keep them, lie below the ground beside a seam."""
     layout = next(one for one in layouts(7, 4.0) if one.name == "a cliff of forty metres")

@@ -197,6 +197,7 @@ def test_what_the_exact_check_passes_below_the_cap_is_free_in_the_mesh_for_bound
     assert passed > 30
 
 
+@pytest.mark.nightly_but("amsl-bare", "amsl-errors")
 @pytest.mark.slow
 @pytest.mark.parametrize("limits", LIMITS)
 @pytest.mark.parametrize("world", ["hills", "amsl", "tall", "lids"])

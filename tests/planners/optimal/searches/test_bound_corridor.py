@@ -67,7 +67,7 @@ def test_a_notch_that_is_shut_is_left_alone() -> None:
     assert work.incumbent.cost == before
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_stops_are_passed_as_before() -> None:
     work = through(0.1, via=(Via(500.0, MIDDLE_M + 30.0, 82.0),))
     below = work.incumbent

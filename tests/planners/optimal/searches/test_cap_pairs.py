@@ -87,7 +87,7 @@ class Caps:
         return min(map(self.cost, [*np.linspace(self.low, self.top, 3000), *self.at, self.low]))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @given(st.integers(0, 2**31), st.sampled_from([0.0, 1e-3, 1e-2]), st.sampled_from([0.0, 0.02, 0.3]))
 @settings(max_examples=draws(60))
 def test_no_cap_costs_less_than_the_bound(seed: int, gap: float, blind: float) -> None:
@@ -302,6 +302,7 @@ def test_no_path_past_vias_costs_less_than_the_bound(objective: Objective, climb
     assert near >= 1
 
 
+@pytest.mark.nightly_but("1-0.04")
 @pytest.mark.slow
 @pytest.mark.parametrize(("seed", "least_percent"), [(1, 0.04), (13, 0.1), (29, 0.2)])
 def test_fine_tracks_with_a_track_error_pass_as_near_to_terrain_as_allowed(
