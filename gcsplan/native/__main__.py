@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import importlib
 import importlib.metadata
 import os
+import pkgutil
 import platform
 import subprocess
 import sys
@@ -15,12 +15,12 @@ from gcsplan.native.kernel_unit import KernelUnit
 from gcsplan.native.llvm import llvm_version
 
 KERNEL_UNITS = {
-    "world": "gcsplan.world.kernels.compiled",
-    "planners": "gcsplan.planners.compiled",
-    "swarm": "gcsplan.research.swarm.compiled",
-    "turns": "gcsplan.planners.turns.compiled",
+    "world": "gcsplan.world.kernels.compiled:WORLD_UNIT",
+    "planners": "gcsplan.planners.compiled:PLANNERS_UNIT",
+    "swarm": "gcsplan.research.swarm.compiled:SWARM_UNIT",
+    "turns": "gcsplan.planners.turns.compiled:TURNS_UNIT",
 }
-"""The modules of kernel units, by name. Each is made in its own process, because numba reads its options once."""
+"""Where kernel units stand, by name. Each is made in its own process, because numba reads its options once."""
 
 NUMBA_OPTIONS = {
     # For any processor, not vectorised.
@@ -28,6 +28,12 @@ NUMBA_OPTIONS = {
     # Vectorised for vectors of four numbers; processors without such vectors compute two at a time.
     True: {"CPU_NAME": "haswell", "CPU_FEATURES": "", "LOOP_VECTORIZE": "1", "SLP_VECTORIZE": "1"},
 }
+
+
+def kernel_unit(name: str) -> KernelUnit:
+    """The unit of this name."""
+    unit: KernelUnit = pkgutil.resolve_name(KERNEL_UNITS[name])
+    return unit
 
 
 def main(names: list[str]) -> None:
@@ -38,11 +44,11 @@ def main(names: list[str]) -> None:
         for name in names or KERNEL_UNITS:
             subprocess.run([sys.executable, "-m", "gcsplan.native", name], check=True)
         return
-    unit: KernelUnit = importlib.import_module(KERNEL_UNITS[names[0]]).UNIT
+    unit = kernel_unit(names[0])
     began = time.perf_counter()
     digest = unit.digest()
     if digest is None:
-        raise SystemExit(f"the sources of {KERNEL_UNITS[names[0]]} are not at hand")
+        raise SystemExit(f"the sources of the kernels {names[0]} are not at hand")
     if unit.vectors and platform.machine().lower() not in ("x86_64", "amd64"):
         raise SystemExit(f"{names[0]} is made on x86-64 alone: the width of its vectors is chosen for that processor")
     assert "numba" not in sys.modules

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from gcsplan.native.kernel_unit import KernelUnit
 
-UNIT = KernelUnit(
+PLANNERS_UNIT = KernelUnit(
     "planners",
     Path(__file__).parent,
     "gcsplan.planners",
@@ -24,9 +24,9 @@ UNIT = KernelUnit(
     ),
 )
 
-device = UNIT.device
+device = PLANNERS_UNIT.device
 """Decorator of a function that only kernels call; it allocates nothing."""
 
-kernel = UNIT.kernel
+kernel = PLANNERS_UNIT.kernel
 """Decorator of a function that Python calls. It allocates nothing: Python passes in the arrays to work in, and calls
 again with larger ones if they are too small."""

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 from gcsplan.native.kernel_unit import QUICK_NOTICE, SLOW_NOTICE, compilation_reported
-from gcsplan.world.kernels.compiled import UNIT as WORLD
+from gcsplan.world.kernels.compiled import WORLD_UNIT
 from tests.support.toy_kernels import imported_anew, kernels, notices, ship, value, write
 
 
 def test_what_is_shipped_was_made_from_the_source_as_it_stands() -> None:
-    made_of = json.loads(WORLD.shipped.read_bytes().partition(b"\n")[0])["sources"]
-    assert made_of == WORLD.digest(), "run python -m gcsplan.native"
+    made_of = json.loads(WORLD_UNIT.shipped.read_bytes().partition(b"\n")[0])["sources"]
+    assert made_of == WORLD_UNIT.digest(), "run python -m gcsplan.native"
 
 
 @pytest.mark.slow

@@ -9,17 +9,17 @@ import pytest
 from gcsplan.native import cache
 from gcsplan.native.kernel_unit import QUICK_NOTICE, SLOW_NOTICE
 from gcsplan.native.llvm import HostMachine
-from gcsplan.world.kernels.compiled import UNIT as WORLD
+from gcsplan.world.kernels.compiled import WORLD_UNIT
 from tests.support.toy_kernels import kernels, notices
 
 
 @pytest.mark.nightly
 def test_this_llvm_reads_what_is_shipped() -> None:
-    bitcode = cache.read_shipped(WORLD.shipped, WORLD.digest())
+    bitcode = cache.read_shipped(WORLD_UNIT.shipped, WORLD_UNIT.digest())
     assert bitcode is not None
     code = HostMachine().compile(bitcode)
     assert code is not None
-    assert set(HostMachine().link(code, tuple(WORLD.forms))) == {"judge", "pieces", "around", "local_extrema"}
+    assert set(HostMachine().link(code, tuple(WORLD_UNIT.forms))) == {"judge", "pieces", "around", "local_extrema"}
 
 
 @pytest.mark.slow

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import importlib
-
 import pytest
 
-from gcsplan.native.__main__ import KERNEL_UNITS, main
+from gcsplan.native.__main__ import KERNEL_UNITS, kernel_unit, main
 
 
 @pytest.mark.parametrize("name", KERNEL_UNITS)
 def test_each_name_is_that_of_a_unit_with_a_shipped_form(name: str) -> None:
-    unit = importlib.import_module(KERNEL_UNITS[name]).UNIT
+    unit = kernel_unit(name)
     assert unit.name == name
     assert unit.shipped.name == f"{name}.kernels"
     assert unit.shipped.is_file()

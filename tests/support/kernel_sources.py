@@ -7,6 +7,7 @@ from pathlib import Path
 from types import ModuleType
 
 import gcsplan
+from gcsplan.native.kernel_unit import KernelUnit
 
 ROOT = Path(gcsplan.__file__).parent
 HARMLESS = {"gcsplan.arrays", "gcsplan.world.geometry.limits"}
@@ -20,9 +21,9 @@ def imported_by(path: Path) -> set[str]:
     return {name for name in named if name.startswith("gcsplan.")}
 
 
-def faults(compiled: ModuleType) -> list[str]:
-    """The modules that the list of the unit in ``compiled`` lacks, or has too much."""
-    listed = {path.resolve() for path in compiled.UNIT.sources}
+def faults(compiled: ModuleType, unit: KernelUnit) -> list[str]:
+    """The modules that the list of ``unit``, made in ``compiled``, lacks, or has too much."""
+    listed = {path.resolve() for path in unit.sources}
     modules = {".".join(("gcsplan", *p.resolve().relative_to(ROOT).with_suffix("").parts)) for p in listed}
     texts = {path: path.read_text(encoding="utf-8") for path in ROOT.rglob("*.py")}
     named = [path for path, text in texts.items() if compiled.__name__ in text]  # the others need no parser

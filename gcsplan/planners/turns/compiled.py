@@ -6,10 +6,10 @@ from pathlib import Path
 
 from gcsplan.native.kernel_unit import KernelUnit
 
-UNIT = KernelUnit("turns", Path(__file__).parent, "gcsplan.planners.turns", ("kernels",))
+TURNS_UNIT = KernelUnit("turns", Path(__file__).parent, "gcsplan.planners.turns", ("kernels",))
 
-device = UNIT.device
+device = TURNS_UNIT.device
 """Marks a function that only kernels call."""
 
-kernel = UNIT.kernel
+kernel = TURNS_UNIT.kernel
 """Marks a function that Python calls. It allocates nothing: its caller passes all arrays."""

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from gcsplan.native.kernel_unit import KernelUnit
 
-UNIT = KernelUnit(
+SWARM_UNIT = KernelUnit(
     "swarm",
     Path(__file__).parent,
     "gcsplan.research.swarm",
@@ -14,8 +14,8 @@ UNIT = KernelUnit(
     vectors=True,
 )
 
-device = UNIT.device
+device = SWARM_UNIT.device
 """Marks a function that only kernels call; it allocates nothing."""
 
-kernel = UNIT.kernel
+kernel = SWARM_UNIT.kernel
 """Marks a function that Python calls. It allocates nothing: its caller passes all arrays."""

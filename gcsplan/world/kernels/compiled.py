@@ -6,7 +6,7 @@ from pathlib import Path
 
 from gcsplan.native.kernel_unit import KernelUnit
 
-UNIT = KernelUnit(
+WORLD_UNIT = KernelUnit(
     "world",
     Path(__file__).parents[1],
     "gcsplan.world",
@@ -24,14 +24,14 @@ UNIT = KernelUnit(
     ),
 )
 
-device = UNIT.device
+device = WORLD_UNIT.device
 """Decorator of a function that only kernels call; it allocates nothing: counting references would cost more than the
 rest."""
 
-inlined = UNIT.inlined
+inlined = WORLD_UNIT.inlined
 """The same for a function with one caller, into which it is copied."""
 
-kernel = UNIT.kernel
+kernel = WORLD_UNIT.kernel
 """Decorator of a function that Python calls; it allocates nothing: Python passes in the arrays to work in."""
 
 SURFACE, ONE_SURFACE = "f8[] f8[,] f8[,]", "f8[] f8[,]"

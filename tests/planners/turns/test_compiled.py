@@ -7,11 +7,11 @@ from tests.support.kernel_sources import faults
 
 
 def test_the_unit_of_turns_lists_all_its_modules() -> None:
-    assert faults(compiled) == []
+    assert faults(compiled, compiled.TURNS_UNIT) == []
 
 
 def test_it_is_separate_from_the_planners_so_that_a_copter_loads_no_turns() -> None:
-    from gcsplan.planners.compiled import UNIT
+    from gcsplan.planners.compiled import PLANNERS_UNIT
 
-    assert compiled.UNIT.name != UNIT.name
-    assert not set(compiled.UNIT.sources) & set(UNIT.sources)
+    assert compiled.TURNS_UNIT.name != PLANNERS_UNIT.name
+    assert not set(compiled.TURNS_UNIT.sources) & set(PLANNERS_UNIT.sources)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import json
 import math
 import os
@@ -20,14 +19,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gcsplan.native import cache
-from gcsplan.native.__main__ import KERNEL_UNITS
-from gcsplan.native.kernel_unit import KernelUnit
+from gcsplan.native.__main__ import KERNEL_UNITS, kernel_unit
 from gcsplan.native.signature import Held
 from gcsplan.planners.problem import Problem
 from gcsplan.research.swarm import cost_kernels as k
 from gcsplan.research.swarm import curve_kernels as ck
 from gcsplan.research.swarm import scene_kernels as sk
-from gcsplan.research.swarm.compiled import UNIT
+from gcsplan.research.swarm.compiled import SWARM_UNIT
 from gcsplan.research.swarm.encodings import Code
 from gcsplan.research.swarm.objectives import OBJECTIVES, Cost
 from gcsplan.research.swarm.scene import Scene
@@ -69,7 +67,7 @@ def plain_terms(cost: Cost, controls: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("name", KERNEL_UNITS)
 def test_what_is_shipped_was_made_from_the_source_as_it_stands(name: str) -> None:
-    unit: KernelUnit = importlib.import_module(KERNEL_UNITS[name]).UNIT
+    unit = kernel_unit(name)
     made_of = json.loads(unit.shipped.read_bytes().partition(b"\n")[0])["sources"]
     assert made_of == unit.digest(), f"run python -m gcsplan.native {name}"
 
@@ -86,7 +84,7 @@ def test_machine_code_gives_what_python_gives(objective: str, points: int) -> No
 @pytest.mark.slow
 def test_no_sum_of_what_is_shipped_may_still_be_reordered_or_fused() -> None:
     """Otherwise the result of a swarm would depend on the processor's instructions."""
-    bitcode = cache.read_shipped(UNIT.shipped, UNIT.digest())
+    bitcode = cache.read_shipped(SWARM_UNIT.shipped, SWARM_UNIT.digest())
     assert bitcode is not None
     text = str(llvm.parse_bitcode(bitcode))
     assert "<4 x double>" in text
@@ -140,7 +138,7 @@ def test_an_older_processors_instructions_give_the_same_bytes(
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     monkeypatch.setattr(llvm, "get_host_cpu_name", lambda: processor)
     monkeypatch.setattr(llvm, "get_host_cpu_features", llvm.FeatureMap)
-    UNIT.forget()
+    SWARM_UNIT.forget()
     there = [cost.terms(controls), cost_of("ssgwo", 7).terms(controls)]
     assert list(tmp_path.glob("gcsplan/swarm-*.code"))
     assert [a.tobytes() for a in there] == [a.tobytes() for a in here]
