@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from gcsplan.app.plan.corners import cut, moved, sharpened
 from gcsplan.app.plan.left_out import LeavingOut
 from gcsplan.app.plan.model import Brief, VehiclePlan
 from gcsplan.app.plan.problem import bow_margin_m, built, looked_over, make_problem, run_planner, unsafe
@@ -15,7 +14,14 @@ from gcsplan.app.plan.replanning import Attempts, on_path, replanned
 from gcsplan.arrays import Floats
 from gcsplan.check.verdict import Verdict
 from gcsplan.errors import InputError, NoMission
-from gcsplan.mavlink.build.multirotor import acceptance_radius_m, cuts_corners, spaced_out
+from gcsplan.mavlink.build.multirotor import (
+    acceptance_radius_m,
+    corners_cut,
+    cuts_corners,
+    moved_corners,
+    sharpened_corners,
+    spaced_out,
+)
 from gcsplan.mavlink.build.order import MARGINS, Gates, Order
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.mission_file import VehicleRequest
@@ -106,7 +112,7 @@ def _built(
         mission, verdict = built(over, request, solution, order)
         more: set[int] = set()
         if cuts_corners(vehicle):
-            more = cut(mission, on_path(mission, verdict), points, over.world) - corners
+            more = corners_cut(mission, on_path(mission, verdict), points, over.world) - corners
         if not more:
             return solution, order, mission, verdict
         corners |= more
@@ -116,10 +122,10 @@ def _built(
 def _mended(problem: Problem, vehicle: Vehicle, points: Floats, corners: set[int]) -> Floats:
     """The path (N, 3) with ``corners`` that are cut less; vias stay."""
     if vehicle.autopilot is Autopilot.ARDUCOPTER:
-        return sharpened(points, corners)
+        return sharpened_corners(points, corners)
     for via in problem.via:
         corners = corners - set(np.flatnonzero(np.hypot(*(points[:, :2] - (via.east_m, via.north_m)).T) < PASSED_M))
-    return moved(points, corners, acceptance_radius_m(vehicle))
+    return moved_corners(points, corners, acceptance_radius_m(vehicle))
 
 
 def _both_ways(request: VehicleRequest, altitude_frame: str) -> VehicleRequest:

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gcsplan.mavlink.build.multirotor import build_mission
+from gcsplan.mavlink.build.multirotor import SHORT_LEG_M, build_mission, moved_corners, sharpened_corners
 from gcsplan.mavlink.build.order import LEG_BOW_M, LONGEST_LEG_M, MARGINS, Order, slope_margin, split_legs
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
@@ -168,3 +168,29 @@ def test_terrain_frame_heights_count_from_the_ground_under_each_point() -> None:
     top = stored(mission.items[2], Autopilot.ARDUCOPTER)
     assert top.frame == m.TERRAIN
     assert top.z == pytest.approx(80.0, abs=0.5)
+
+
+def test_the_leg_behind_a_corner_is_no_steeper_than_the_next_whatever_is_rounded() -> None:
+    points = np.array([[0.0, 0.0, 100.0], [500.0, 0.0, 200.0], [1000.0, 0.0, 330.0]])
+    mended = sharpened_corners(points, {1})
+    assert len(mended) == 4
+    run, rise = mended[2, 0] - mended[1, 0], mended[2, 2] - mended[1, 2]
+    assert run == pytest.approx(SHORT_LEG_M)
+    assert 0.0 <= rise <= max(0.26 * SHORT_LEG_M - 0.01, 0.0)
+
+
+def test_a_moved_corner_is_turned_before_beyond_the_old_next_leg() -> None:
+    """From where the turn begins, straight to the end of the next leg: nowhere inside the old corner."""
+    for degrees in (5.0, 30.0, 60.0, 90.0, 120.0):
+        turn = np.radians(degrees)
+        old = np.array([[0.0, 0.0, 50.0], [100.0, 0.0, 50.0], [100.0 + 80 * np.cos(turn), 80 * np.sin(turn), 50.0]])
+        new = moved_corners(old, {1}, 1.0)
+        assert np.array_equal(new[[0, 2]], old[[0, 2]])
+        way = (new[1] - new[0])[:2] / np.hypot(*(new[1] - new[0])[:2])
+        begun, end = new[1, :2] - way, old[2, :2]
+        inside = np.array([-np.sin(turn), np.cos(turn)])  # of the old next leg
+        flown = begun + np.linspace(0.0, 1.0, 50)[:, None] * (end - begun)
+        beyond = (flown[:, 0] - 100.0) * np.cos(turn) + flown[:, 1] * np.sin(turn) >= 0.0
+        assert ((flown - old[1, :2]) @ inside)[beyond].max() <= 1e-9
+    straight = np.array([[0.0, 0.0, 50.0], [100.0, 0.0, 50.0], [200.0, 0.0, 50.0]])
+    assert np.array_equal(moved_corners(straight, {1}, 1.0), straight)

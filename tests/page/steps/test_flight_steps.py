@@ -29,9 +29,8 @@ from gcsplan.errors import Cancelled, LinkError
 from gcsplan.page.edits import Edits
 from gcsplan.page.refused import PageError
 from gcsplan.page.server import MapServer
-from gcsplan.page.steps.flight_steps import STEP_KINDS
+from gcsplan.page.steps.flight_steps import STEP_KINDS, ShownPlan
 from gcsplan.page.steps.live_vehicles import WATCHER, is_silent
-from gcsplan.page.steps.shown_plan import ShownPlan
 from gcsplan.page.steps.words import live_of
 from gcsplan.sim.vehicle.loopback import LoopbackVehicle
 from gcsplan.sim.vehicle.misbehaviour import Misbehaviour

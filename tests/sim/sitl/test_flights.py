@@ -1,16 +1,19 @@
-"""When a plane in SITL arrives, and when its flight is over."""
+"""When a vehicle in SITL arrives, when its flight is over, and why it did not arrive."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import MissionItem
-from gcsplan.sim.sitl.flights import arrival_s, is_column, is_over, reach_m
+from gcsplan.notes.note import Note
+from gcsplan.sim.sitl.flights import FlightWatch, arrival_s, is_column, is_over, reach_m
 from tests.support.sitl_parts import PLANE, a_part, ramp
 
 
@@ -49,3 +52,51 @@ def test_a_plane_that_circles_is_watched_for_a_while() -> None:
     assert not is_over(circling, [away] * 40 + [goal] * 40, clock, goal)
     assert not is_over(circling, [away] * 80, clock, goal)
     assert not is_over(part, [goal] * 80, clock, goal)  # it lands
+
+
+def text(words: str, severity: int = 6) -> Any:
+    return SimpleNamespace(get_type=lambda: "STATUSTEXT", text=words, severity=severity)
+
+
+def beat(mode: int) -> Any:
+    return SimpleNamespace(get_type=lambda: "HEARTBEAT", custom_mode=mode)
+
+
+def test_ground_that_is_hit_on_the_way_ends_the_flight_with_its_cause() -> None:
+    watch = FlightWatch(a_part(ramp()).mission)
+    watch.note(beat(3), 1)
+    watch.note(text("SIM Hit ground at 0.9 m/s"), 1)  # at take-off
+    assert not watch.crashed
+    watch.note(text("SIM Hit ground at 0.01 m/s"), 2)
+    assert not watch.crashed
+    watch.note(text("SIM Hit ground at 1.502964 m/s"), 2)
+    assert watch.crashed
+    [hit] = watch.why()
+    assert (hit.code, hit.item) == ("hit_ground", 2)
+    assert str(hit) == "it hit the ground at 1.5 m/s on its way to item 2"
+    assert watch.why(90.0) == (hit, Note("other_ground", height_m=90.0))
+
+
+def test_a_landing_touches_the_ground() -> None:
+    watch = FlightWatch(a_part(ramp()).mission)
+    watch.note(text("SIM Hit ground at 0.6 m/s"), 3)
+    assert not watch.crashed
+    assert watch.why(90.0) == ()
+
+
+def test_a_failsafe_is_named_with_what_the_vehicle_said() -> None:
+    watch = FlightWatch(a_part(ramp()).mission)
+    watch.note(text("Reached command #1"), 1)
+    watch.note(text("Battery Failsafe", 4), 2)
+    watch.note(beat(3), 2)
+    watch.note(beat(6), 2)
+    watch.note(beat(9), 2)
+    watch.timed_out = True
+    assert watch.why() == (
+        Note("left_auto", 2, mode="RTL"), Note("time_was_up", 2), Note("vehicle_said", texts="Battery Failsafe"),
+    )  # fmt: skip
+    never = Note("never_arrived_for", name="uav1", why=watch.why())
+    assert str(never) == (
+        "uav1 never arrived at its goal: it left AUTO for RTL at item 2, it still flew to item 2 when the time was up, "
+        "it sent: Battery Failsafe"
+    )
