@@ -22,7 +22,7 @@ from typing import Any
 from gcsplan.check.flight.ways_home import WaysHome
 from gcsplan.check.motion.return_rules import RETURN_RULES, return_s, speed_home_m_s
 from gcsplan.check.motion.stopping import detour_home_m
-from gcsplan.check.motion.stretch import Place, flat_m, offset_m
+from gcsplan.check.motion.stretch import Place, flat_m, offset_m, place_on
 from gcsplan.check.verdict import LegFigures, Verdict
 from gcsplan.figures import raised
 from gcsplan.notes.note import Note
@@ -141,15 +141,15 @@ def battery_home(verdict: Verdict, vehicle: Vehicle, home: Place, return_amsl_m:
         def used(
             part: float, leg: LegFigures = leg, way_j: float = way_j, ahead_j: float = ahead_j, stands: bool = stands
         ) -> float:
-            return ahead_j + part * way_j + back_j(_between(leg, part), leg.speed_m_s, stands)
+            return ahead_j + part * way_j + back_j(place_on(leg.start, leg.end, part), leg.speed_m_s, stands)
 
         ends = [(0.0, used(0.0)), (1.0, used(1.0) + hold_j)]
         for part, j in ends:
             if j > most:
-                most, most_at, most_m = j, _between(leg, part), along + part * leg.horizontal_m
+                most, most_at, most_m = j, place_on(leg.start, leg.end, part), along + part * leg.horizontal_m
         for a, b in _above(used, usable, ends[1][1] > usable):
             if first is None:
-                first = (_between(leg, a), along + a * leg.horizontal_m, leg.seq)
+                first = (place_on(leg.start, leg.end, a), along + a * leg.horizontal_m, leg.seq)
             low, high = along + a * leg.horizontal_m, along + b * leg.horizontal_m
             if short and low <= short[-1][1] + 1e-6:
                 short[-1] = (short[-1][0], max(short[-1][1], high))
@@ -183,11 +183,6 @@ def flown(legs: Sequence[LegFigures]) -> Iterator[tuple[LegFigures, float, float
             for leg in run:
                 yield leg, skipped * round_j, skipped * round_m
                 skipped = 0
-
-
-def _between(leg: LegFigures, part: float) -> Place:
-    a, b = leg.start, leg.end
-    return a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1]), a[2] + part * (b[2] - a[2])
 
 
 def _above(used: Callable[[float], float], usable: float, at_end: bool) -> list[tuple[float, float]]:

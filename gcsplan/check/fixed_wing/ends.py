@@ -38,7 +38,7 @@ from gcsplan.check.motion.circles import circle_reach_m
 from gcsplan.check.motion.flight_state import Aboard
 from gcsplan.check.motion.spline import towards
 from gcsplan.check.motion.stopping import about_turn_m
-from gcsplan.check.motion.stretch import SAME_PLACE_M, Place, Stretch, degree_m, flat_m, offset_m
+from gcsplan.check.motion.stretch import SAME_PLACE_M, Place, Stretch, degree_m, flat_m, offset_m, place_on
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import MissionItem
@@ -153,7 +153,7 @@ def blown_slant(ground: Place, top: Place, aside_m: float, from_part: float) -> 
     if not aside_m > 0.0:
         return []
     ends = [k / BLOWN_PARTS for k in range(BLOWN_PARTS + 1)]
-    at = [(*between(ground, top, part), ground[2] + part * (top[2] - ground[2])) for part in ends]
+    at = [place_on(ground, top, part) for part in ends]
     carried = [aside_m * min(1.0, part / max(from_part, 1e-9)) for part in ends]
     return [(at[k], at[k + 1], carried[k + 1]) for k in range(BLOWN_PARTS)]
 
@@ -174,7 +174,7 @@ def above_slant(ground: Place, top: Place, limits: Limits, over_m: float) -> lis
         )
         found.append((low, high, half))
     if (half := over_m / 2.0) > 0.0:
-        found.append(((*between(ground, top, OVER_FROM), top[2] + half), (*top[:2], top[2] + half), half))
+        found.append(((*place_on(ground, top, OVER_FROM)[:2], top[2] + half), (*top[:2], top[2] + half), half))
     return found
 
 
@@ -182,10 +182,6 @@ def over_m(vehicle: Vehicle) -> float:
     """How far above its take-off's altitude, and beyond the altitude error, an aircraft may get."""
     over = OVER_TAKEOFF_M if vehicle.climb_out is None else OVER_S * vehicle.climb_out.climb_m_s
     return max(0.0, over - vehicle.limits.altitude_error_m)
-
-
-def between(a: Place, b: Place, part: float) -> tuple[float, float]:
-    return a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1])
 
 
 def circle_up(pilot: Aboard, seq: int, item: MissionItem, radius_m: float) -> bool:
@@ -395,7 +391,7 @@ def turns_early(pilot: Aboard, seq: int, after: MissionItem | None) -> None:
         pilot.at_once(seq, "cruise", start, target, terrain=terrain, reach_m=swing_m + gap_m)
         if half > 0.0:
             near = min(1.0, OVER_FOR_M / max(flat_m(start, target), 1.0))
-            low, high = (*start[:2], end[2] + half), (*between(start, target, near), end[2] + half)
+            low, high = (*start[:2], end[2] + half), (*place_on(start, target, near)[:2], end[2] + half)
             pilot.instead(seq, "takeoff", low, high, column=True, reach_m=swing_m + gap_m, band_m=half)
     pilot.note(Note("turns_early", seq))
 
@@ -423,20 +419,13 @@ def climbed(stretches: Sequence[Stretch], vehicle: Vehicle) -> list[Stretch]:
         within = {x for x in (up_m, up_m + slow_m) if at_m + SAME_PLACE_M < x < at_m + length - SAME_PLACE_M}
         for a, b in pairwise([at_m, *sorted(within), at_m + length]):
             took_s = _seconds(b, up_m, known, cruise_m_s) - _seconds(a, up_m, known, cruise_m_s)
-            start, end = _on(s, (a - at_m) / length), _on(s, (b - at_m) / length)
+            start, end = (place_on(s.start, s.end, (m - at_m) / length) for m in (a, b))
             true_m_s = math.hypot(b - a, end[2] - start[2]) / took_s
             indicated = true_m_s / float(true_per_indicated(0.5 * (start[2] + end[2])))
             rates = (true_m_s, true_m_s)  # they bound nothing
             pieces.append(replace(s, start=start, end=end, speed_m_s=indicated, rates_m_s=rates))
         at_m += length
     return pieces + list(stretches[len(out) :])  # circles that continue it have another item
-
-
-def _on(s: Stretch, part: float) -> tuple[float, float, float]:
-    if part <= 0.0 or part >= 1.0:
-        return s.start if part <= 0.0 else s.end
-    a, b = s.start, s.end
-    return a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1]), a[2] + part * (b[2] - a[2])
 
 
 def _seconds(along_m: float, up_m: float, known: ClimbOut, cruise_m_s: float) -> float:

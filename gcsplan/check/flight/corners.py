@@ -33,7 +33,7 @@ from itertools import pairwise
 
 from gcsplan.check.fixed_wing.arcs import bend
 from gcsplan.check.motion.circles import circle_growth
-from gcsplan.check.motion.stretch import SAME_PLACE_M, Flight, Place, Stretch, flat_m, offset_m
+from gcsplan.check.motion.stretch import SAME_PLACE_M, Flight, Stretch, flat_m, offset_m, place_on
 from gcsplan.check.motion.turn_parameters import DEFAULTS, Tuning
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
@@ -214,8 +214,9 @@ class _Cutter:
             for a, b in [(0.0, 1.0)] if one.terrain else pairwise(cuts):
                 left = 1.0 - a if fading else 1.0
                 band_m = height_m if one.kind == "rtl" else left * height_m
+                start, end = place_on(one.start, one.end, a), place_on(one.start, one.end, b)
                 yield replace(
-                    one, start=_between(one, a), end=_between(one, b), reach_m=one.reach_m + left * aside_m,
+                    one, start=start, end=end, reach_m=one.reach_m + left * aside_m,
                     band_m=one.band_m + band_m, hold_s=0.0, on_path=False,
                 )  # fmt: skip
 
@@ -246,13 +247,6 @@ class _Cutter:
 
 def _way(s: Stretch) -> tuple[object, ...]:
     return s.seq, s.kind, s.start[:2], s.end[:2]
-
-
-def _between(s: Stretch, part: float) -> Place:
-    if part in (0.0, 1.0):
-        return s.end if part else s.start
-    a, b = s.start, s.end
-    return a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1]), a[2] + part * (b[2] - a[2])
 
 
 def _turn(s: Stretch, after: Stretch) -> float:

@@ -112,6 +112,13 @@ def degree_m(lat_deg: float) -> tuple[float, float]:
     return math.radians(east), math.radians(north)
 
 
+def place_on(a: Place, b: Place, part: float) -> Place:
+    """The place at a ``part`` of the straight way from ``a`` to ``b``; up to 0 it is ``a``, from 1 it is ``b``."""
+    if part <= 0.0 or part >= 1.0:
+        return a if part <= 0.0 else b
+    return a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1]), a[2] + part * (b[2] - a[2])
+
+
 @lru_cache(maxsize=1024)
 def offset_m(a: Place, b: Place) -> tuple[float, float]:
     """Metres east and north from ``a`` to ``b``, by the ellipsoid's radii at mid latitude: 1e-6 off over 100 km."""
