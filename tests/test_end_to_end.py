@@ -124,6 +124,7 @@ def tampered(mission: Mission, rng: np.random.Generator) -> Mission:
     return replace(mission, items=tuple(items))
 
 
+@pytest.mark.nightly_but("px4_least_energy")
 @pytest.mark.parametrize("name", MISSIONS)
 def test_whatever_the_second_opinion_finds_in_a_tampered_mission_the_judge_finds_too(name: str) -> None:
     done = planned(name)

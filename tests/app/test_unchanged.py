@@ -46,6 +46,7 @@ def spoil(path: Path, *, same_time: bool) -> None:
     os.utime(path, ns=(before.st_atime_ns, new))
 
 
+@pytest.mark.nightly_but("table", "dat_files", "geotiff")
 @pytest.mark.first_quick
 @pytest.mark.parametrize("kind", CASES)
 def test_every_file_that_a_mission_reads_counts(kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -95,6 +95,7 @@ FOUND = [
 ]
 
 
+@pytest.mark.nightly_but("slits 2", "a slit with room was called shut, which is proved")
 @pytest.mark.slow
 @pytest.mark.parametrize(("family", "seed"), FOUND)
 def test_what_the_campaign_found_once_is_cured(family: str, seed: int) -> None:

@@ -22,6 +22,7 @@ NOTHING = {
 }
 
 
+@pytest.mark.nightly_but("gcsplan.app.batch.has_outputs")
 @pytest.mark.slow
 @pytest.mark.parametrize("fault", NOTHING)
 def test_a_planted_fault_is_found(fault: str, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -215,6 +215,7 @@ def test_a_vehicle_with_another_return_altitude_is_refused_before_anything_is_se
         )
 
 
+@pytest.mark.nightly_but("nothing")
 @pytest.mark.slow
 @pytest.mark.parametrize("told", [{}, {"RTL_ALT": math.nan}], ids=["nothing", "no number"])
 def test_a_vehicle_that_hides_its_return_altitude_gets_no_mission_that_requires_one(

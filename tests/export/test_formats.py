@@ -277,6 +277,7 @@ def test_zones_stand_in_the_kml_from_floor_to_ceiling() -> None:
     assert "from 50 m AGL to 900.5 m AMSL" in str(zones["airfield"].findtext(KML + "description"))
 
 
+@pytest.mark.slow
 @settings(max_examples=draws(25))
 @given(st.text())
 def test_no_name_breaks_the_kml(name: str) -> None:

@@ -94,6 +94,7 @@ def test_a_line_without_an_end_is_refused(text: str, tmp_path: Path) -> None:
     assert "has more than 100000 characters" in said or "is no CSV" in said
 
 
+@pytest.mark.nightly_but("log.bin-unknown", "log.bin-zeros", "log.bin-noise")
 @pytest.mark.first_quick
 @pytest.mark.parametrize("kind", ["noise", "unknown", "zeros"])
 @pytest.mark.parametrize("name", ["log.bin", "log.tlog"])

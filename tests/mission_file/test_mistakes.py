@@ -94,6 +94,14 @@ def test_a_mistake_ends_in_one_message_and_nothing_is_written(
     assert files_of(folder) == before
 
 
+@pytest.mark.nightly_but(
+    "clearance-misspelt",
+    "climb-of-zero",
+    "max-amsl-below-ground",
+    "start-swapped",
+    "vehicle-instead-of-vehicles",
+    "zone-file-not-there",
+)
 @pytest.mark.parametrize(
     "file", [pytest.param(f, marks=[] if f.stem in QUICK else pytest.mark.slow, id=f.stem) for f in FILES]
 )

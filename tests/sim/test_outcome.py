@@ -49,7 +49,7 @@ def test_two_that_meet_are_named_with_the_moment() -> None:
     assert rehearse(later, FLAT, Terms((), 30.0)).safe
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_landing_beside_one_that_stands_is_a_violation_until_the_pad_is_clear() -> None:
     parts = [a_part(1, (0, 0), (1000, 0)), a_part(2, (0, 300), (1000, 20), depart_s=200.0)]
     assert kinds(rehearse(parts, FLAT, Terms((), 30.0))) == ["separation"]

@@ -142,6 +142,7 @@ def check_zones(
             ), (where, violation)  # fmt: skip
 
 
+@pytest.mark.nightly_but("max_agl-36.6")
 @pytest.mark.parametrize("lat_deg", [36.6, -64.0])
 @pytest.mark.parametrize("kind", ["min_agl", "max_agl"])
 def test_long_east_west_legs_are_judged_over_the_degrees_of_the_dem(lat_deg: float, kind: str) -> None:

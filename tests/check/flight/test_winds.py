@@ -246,6 +246,7 @@ CRAFT: dict[str, dict[str, Any]] = {
 }  # fmt: skip
 
 
+@pytest.mark.nightly_but("sharp", "rounded")
 @pytest.mark.first_quick
 @pytest.mark.parametrize("kind", CRAFT)
 @given(st.integers(1, 7), st.integers(0, 2**32 - 1))

@@ -573,6 +573,7 @@ def test_figures_are_plain_values_and_words() -> None:
 # -- brute force ----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.nightly_but("px4-seeds1")
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("autopilot", "seeds"), [(COPTER, (5002, 5119, 6077, 4000, 4002)), (PX4, (4003, 4007, 4011)), (PLANE, (4000, 4001))]

@@ -181,6 +181,7 @@ def inside_in_degrees(lat: float, lon: float, ring: list[tuple[float, float]]) -
     return crossings % 2 == 1
 
 
+@pytest.mark.nightly_but("0.01", "0.5", "95.0")
 @pytest.mark.slow
 @pytest.mark.parametrize("far", [0.01, 0.5, 3.0, 30.0, 84.3, 90.0, 95.0])
 def test_a_fences_edges_are_straight_in_degrees_however_far_its_corners_are(far: float) -> None:

@@ -314,6 +314,7 @@ def test_ssgwo_table_3_is_solved_within_one_percent(unlimited: bool, optimum_m: 
     assert optimum_m - 0.01 <= s.path.length_m <= 1.01 * optimum_m
 
 
+@pytest.mark.nightly_but("1")
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", seeds(2, 2, 5))
 def test_random_missions_on_the_sample_are_solved_safely(seed: int) -> None:
@@ -327,6 +328,7 @@ def test_random_missions_under_the_120_m_rule(seed: int) -> None:
     assert faults_of_plan(random_mission(seed, replace(FIELD, min_agl_m=50.0, max_agl_m=120.0), zones=6)) == []
 
 
+@pytest.mark.nightly_but("40")
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [40, 42, pytest.param(44, marks=pytest.mark.slow)])
 def test_random_missions_under_a_ceiling(seed: int) -> None:

@@ -389,6 +389,7 @@ def test_the_lines_of_a_border_in_degrees_lie_within_the_nodes() -> None:
 # -- the campaign ------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.nightly_but("tiles-3")
 @pytest.mark.slow
 @pytest.mark.parametrize(("family", "seed"), [("ridge", 4), ("tiles", 3), ("edge", 1)])
 def test_campaign_of_worlds(family: str, seed: int) -> None:

@@ -129,6 +129,7 @@ def tier(name: str) -> list[pytest.MarkDecorator]:
     return [pytest.mark.nightly] if name in NIGHTLY else [pytest.mark.slow] if name in SLOW else []
 
 
+@pytest.mark.nightly_but("fence with climb limit", "two walls")
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [pytest.param(name, marks=tier(name)) for name in MISSIONS_REFUSED])
 def test_what_is_reported_to_help_does(name: str) -> None:

@@ -233,6 +233,7 @@ def way_below(problem: Problem, step_m: float = 100.0) -> Floats:
     return np.column_stack([way[out], np.full(len(out), ceiling)])
 
 
+@pytest.mark.nightly_but("0")
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 2])
 def test_paths_between_hills_are_rounded_and_climb_no_steeper_than_allowed(seed: int) -> None:
@@ -315,6 +316,7 @@ def test_a_via_within_a_turn_radius_of_the_start_is_passed_with_a_detour() -> No
     assert np.hypot(*(curve.points[:, :2] - corners[1, :2]).T).min() < 0.51
 
 
+@pytest.mark.nightly_but("goal0")
 @pytest.mark.slow
 @pytest.mark.parametrize("goal", [(500.0, 900.0), (500.0, 520.0), (900.0, 500.0)])
 def test_a_via_is_passed_even_where_the_way_goes_straight_back(goal: tuple[float, float]) -> None:

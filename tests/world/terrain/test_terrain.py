@@ -177,6 +177,7 @@ def test_a_geotiff_in_degrees_is_bilinear_between_its_cell_centres(tmp_path: Pat
     assert surface.grid.error_m < 0.01
 
 
+@pytest.mark.nightly_but("EPSG:32617", "EPSG:3857", "EPSG:32616")
 @pytest.mark.slow
 @pytest.mark.parametrize("crs", ["EPSG:32616", "EPSG:3857", "EPSG:5070", "EPSG:4269", "EPSG:32617", "EPSG:26916+5703"])
 def test_a_geotiff_in_any_system_is_bilinear_in_its_own_grid(tmp_path: Path, crs: str) -> None:

@@ -24,6 +24,7 @@ def rough(seed: int) -> Problem:
     return Problem(Airspace(Surface(z, z, grid)), limits, (10.0, 10.0, 300.0), (70.0, 80.0, 300.0))
 
 
+@pytest.mark.nightly_but("0", "8", "9")
 @pytest.mark.first_quick
 @pytest.mark.parametrize("seed", range(12))
 def test_walls_are_no_higher_than_the_exact_floor(seed: int) -> None:
