@@ -22,7 +22,7 @@ from typing import Any
 from gcsplan.check.flight.ways_home import WaysHome
 from gcsplan.check.motion.return_rules import RETURN_RULES, return_s, speed_home_m_s
 from gcsplan.check.motion.stopping import detour_home_m
-from gcsplan.check.motion.stretch import Place, flat_m, offset_m, place_on
+from gcsplan.check.motion.stretch import Place, flat_m, offset_m, on_globe, place_on
 from gcsplan.check.verdict import LegFigures, Verdict
 from gcsplan.figures import raised
 from gcsplan.notes.note import Note
@@ -146,10 +146,10 @@ def battery_home(verdict: Verdict, vehicle: Vehicle, home: Place, return_amsl_m:
         ends = [(0.0, used(0.0)), (1.0, used(1.0) + hold_j)]
         for part, j in ends:
             if j > most:
-                most, most_at, most_m = j, place_on(leg.start, leg.end, part), along + part * leg.horizontal_m
+                most, most_at, most_m = j, on_globe(place_on(leg.start, leg.end, part)), along + part * leg.horizontal_m
         for a, b in _above(used, usable, ends[1][1] > usable):
             if first is None:
-                first = (place_on(leg.start, leg.end, a), along + a * leg.horizontal_m, leg.seq)
+                first = (on_globe(place_on(leg.start, leg.end, a)), along + a * leg.horizontal_m, leg.seq)
             low, high = along + a * leg.horizontal_m, along + b * leg.horizontal_m
             if short and low <= short[-1][1] + 1e-6:
                 short[-1] = (short[-1][0], max(short[-1][1], high))

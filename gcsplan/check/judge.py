@@ -18,12 +18,13 @@ import numpy as np
 from gcsplan.arrays import Floats, Indices
 from gcsplan.check.fixed_wing.ends import slant_findings
 from gcsplan.check.flight.corners import round_corners
-from gcsplan.check.flight.follow import follow
+from gcsplan.check.flight.follow import follow_in
 from gcsplan.check.flight.times import FlightTimes, spare_s
 from gcsplan.check.flight.winds import Costs, FlightInWind
 from gcsplan.check.margins import enough, nearest_misses, nearest_pass
+from gcsplan.check.motion.flight_state import TERRAIN_ERROR_M
 from gcsplan.check.motion.project import PlaneLegs, legs_in_plane, steep_report, why_unknown, with_error_of_home
-from gcsplan.check.motion.stretch import Flight, Stretch, degree_m
+from gcsplan.check.motion.stretch import Flight, Stretch, degree_m, on_globe
 from gcsplan.check.motion.turn_parameters import DEFAULTS, Tuning
 from gcsplan.check.verdict import LegFigures, Verdict
 from gcsplan.mavlink.mission.autopilots import needs_straight, profile_of
@@ -37,9 +38,6 @@ from gcsplan.world.airspace import LegReport, Legs, Violation
 from gcsplan.world.geodesy.frame import EARTH_RADIUS_M, FARTHEST_M
 from gcsplan.world.geometry.limits import Limits
 from gcsplan.world.world import World
-
-TERRAIN_ERROR_M = 30.0
-"""ArduPilot shifts all terrain by up to this, m, when it arms; terrain-frame legs are judged with it as an error."""
 
 NEAR_DEG = FARTHEST_M / 111_700.0
 """Degrees of latitude, or of longitude anywhere, that are surely no more than `FARTHEST_M`."""
@@ -69,7 +67,7 @@ def judge(
     """
     table = profile_of(mission.autopilot)
     stored = replace(mission, items=tuple(table.stored(item) for item in mission.items))
-    flight = follow(stored, vehicle, world.ground_amsl, world.read_amsl, rtl_rel_home_m=rtl_rel_home_m)
+    flight = follow_in(world, stored, vehicle, rtl_rel_home_m=rtl_rel_home_m, terrain_error_m=terrain_error_m)
     if (unsure := why_unknown(mission.home, vehicle, world)) is not None:
         return Verdict(mission, (), (), (unsure, *flight.not_judged), tuple(flight.notes))
     limits, vehicle = vehicle.limits, with_error_of_home(vehicle, mission.home, world)
@@ -157,7 +155,7 @@ def _missed_gates(flight: Flight, seconds: Floats, blown: FlightInWind | None) -
         by_s = latest_s + spare_s(latest_s - opened_s) - s.until_s
         if by_s > 0.0:
             note = Note("gate_missed", s.seq, latest_s=latest_s, opens_s=s.until_s, by_s=by_s)
-            found.append(Finding(s.seq, "gate", note, *s.end, latest_s, latest_s - by_s, by_s, "s"))
+            found.append(Finding(s.seq, "gate", note, *on_globe(s.end), latest_s, latest_s - by_s, by_s, "s"))
         opened_s = reached_s = s.until_s
     return found
 
@@ -201,7 +199,7 @@ def _blown_away(blown: FlightInWind | None) -> list[Finding]:
     if blown is None or (bad := blown.too_windy) is None:
         return []
     s, wind = blown.stretches[bad.stretch], blown.flies_in.declared
-    lat, lon, amsl = s.end
+    lat, lon, amsl = on_globe(s.end)
     note = Note(
         "wind_too_strong", s.seq, way=s.kind, wind_m_s=bad.speed_m_s, from_deg=bad.from_deg,
         gusts=gusts_note(wind), up_to_m_s=bad.up_to_m_s,
@@ -253,7 +251,7 @@ def _unread(stretches: Sequence[Stretch], plane: PlaneLegs) -> list[Finding]:
     """Findings for terrain-frame legs over ground that the vehicle's grid does not know."""
     found = []
     for s in (stretches[i] for i in plane.unread):
-        lat, lon, amsl = s.end
+        lat, lon, amsl = on_globe(s.end)
         note = Note("over_ground_unread", s.seq, way=s.kind, lat=lat, lon=lon, amsl_m=amsl)
         found.append(Finding(s.seq, "coverage", note, lat, lon, amsl, math.nan, math.nan, math.nan, "m"))
     return found
@@ -276,7 +274,7 @@ def _is_too_far(stretch: Stretch, world: World) -> bool:
 
 
 def _too_far(s: Stretch) -> Finding:
-    lat, lon, amsl = s.end
+    lat, lon, amsl = on_globe(s.end)
     note = Note("too_far_away", s.seq, way=s.kind, lat=lat, lon=lon, amsl_m=amsl)
     return Finding(s.seq, "coverage", note, lat, lon, amsl, math.nan, math.nan, math.nan, "m")
 
@@ -325,7 +323,8 @@ def _figures(
         moving_j = energy.under_way_j(float(rise_m), air_m, worst_s)
         figures.append(
             LegFigures(
-                seq=s.seq, kind=s.kind, start=s.start, end=s.end, column=s.column, on_path=s.on_path,
+                seq=s.seq, kind=s.kind, start=on_globe(s.start), end=on_globe(s.end),
+                column=s.column, on_path=s.on_path,
                 horizontal_m=float(run_m),
                 length_m=float(length_m),
                 climb_deg=climb_deg,

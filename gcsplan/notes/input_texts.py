@@ -135,6 +135,7 @@ INPUT_TEXTS = {
     "file_not_read": "not read, and not on this page: {why}",
     "plan_without_autopilot": "the file does not say for which autopilot it is: it was read for {autopilot}",
     "plan_rally_points_unread": "the file's {keys} was not read; {cure}",
+    "plan_for_other_kind": "the file is for a {kind}, and missions for {autopilot} are judged as multicopters fly them",
     "plan_fence_unread": "the file's {keys} is not read: {cure}",
     "plan_breach_return_unread": "the file's fence has a breach return point, which was not read",
     "plan_keys_unread": "these keys of the file were not read: {keys}",

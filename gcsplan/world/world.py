@@ -83,6 +83,10 @@ class World:
         """Ground at a place as the vehicle's own grid has it, metres AMSL; NaN where it has none."""
         return self.vehicle_terrain.amsl(lat_deg, lon_deg)
 
+    def read_change_m(self, lat_deg: float, lon_deg: float, reach_m: float) -> float:
+        """How far that ground changes within ``reach_m`` of a place; see `VehicleTerrain.change_m`."""
+        return self.vehicle_terrain.change_m(lat_deg, lon_deg, reach_m)
+
     @cached_property
     def vehicle_terrain(self) -> VehicleTerrain:
         """The ground as a vehicle that has this terrain on board reads it, in the terrain frame."""

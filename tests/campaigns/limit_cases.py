@@ -27,8 +27,11 @@ from tests.support.random_worlds import Ground, random_zones
 COPTER, PLANE, PX4 = Autopilot.ARDUCOPTER, Autopilot.ARDUPLANE, Autopilot.PX4
 LOITER_TO_ALT = 31
 
-FAMILIES = ("copter", "px4", "vtol", "terrain", "return", "spline", "circle", "jump", "wing", "battery", "fleet")
-"""Kinds of mission: straight legs of each autopilot, terrain frame, a return, curves, circles, arcs, jumps, fleets."""
+FAMILIES = (
+    "copter", "px4", "vtol", "terrain", "return", "spline", "circle", "jump", "wing", "battery", "fleet", "frames",
+)  # fmt: skip
+"""Kinds of mission: straight legs of each autopilot, terrain frame, a return, curves, circles, arcs, jumps, fleets,
+another frame at each item. A family's place is part of its seeds."""
 POSTS_M = 20
 """Spacing of the vehicle's terrain, m: the worlds are too small for one of 100 m."""
 
@@ -130,7 +133,7 @@ def make_case(rng: np.random.Generator, family: str) -> Case | None:
     mission = make_mission(rng, family, autopilot, ground, surface, frame)
     if family == "wing":
         surface = with_strip(surface, frame, mission)
-    case = Case(family, ground, surface, (), frame, craft, mission)
+    case = Case(family, ground, surface, (), frame, craft, mission, terrain_error_m=30.0 if family == "frames" else 5.0)
     if case.verdict().safe is not True:
         return None
     for zone in (*random_zones(rng, ground), *corner_zones(rng, case)):
@@ -192,10 +195,20 @@ def make_mission(
     up = cmd.VTOL_TAKEOFF if autopilot is PLANE else cmd.TAKEOFF
     first = np.array([*at_home, points[0, 2]])
     items = [item(up, first, m.RELATIVE)]
-    way = [item(cmd.WAYPOINT, p, kind, float(rng.choice([0.0, 0.0, 3.0])), accept()) for p in points[1:]]
+    kinds = [kind] * (len(points) - 1)
+    if family == "frames":
+        kinds = rng.choice([m.RELATIVE, m.GLOBAL, m.TERRAIN], count).tolist()
+    way = [
+        item(cmd.WAYPOINT, p, k, float(rng.choice([0.0, 0.0, 3.0])), accept())
+        for p, k in zip(points[1:], kinds, strict=True)
+    ]
     land = item(cmd.VTOL_LAND if autopilot is PLANE else cmd.LAND, points[-1], m.RELATIVE)
     items += way
-    if family == "return":
+    if family == "frames" and rng.random() < 0.6:
+        circle = (1.0, 0.0, float(rng.choice([20.0, -35.0, 80.0])), 0.0)
+        items.insert(2, item(cmd.LOITER_TURNS, 0.5 * (points[1] + points[-1]), int(rng.choice(kinds)), *circle))
+    returns = family == "return" or (family == "frames" and rng.random() < 0.5)
+    if returns:
         items.append(MissionItem(cmd.RTL, m.NO_POSITION))
     elif family == "spline":
         items.insert(-1, replace(way[-2], command=cmd.SPLINE_WAYPOINT, params=(float(rng.choice([0, 2])), 0, 0, 0)))
@@ -211,7 +224,7 @@ def make_mission(
         items.append(MissionItem(cmd.DO_JUMP, m.NO_POSITION, (2.0, float(rng.integers(20, 2500)), 0, 0)))
     elif family == "jump":
         items.insert(-1, MissionItem(cmd.DO_JUMP, m.NO_POSITION, (2.0, float(rng.integers(0, 4)), 0, 0)))
-    if family not in ("return", "wing"):
+    if not returns and family != "wing":
         items.append(
             replace(land, z=0.0) if rng.random() < 0.6 else item(cmd.LOITER_UNLIM, points[-1], kind, 0, 0, 25.0)
         )
@@ -268,7 +281,7 @@ def knobs(rng: np.random.Generator, case: Case) -> list[Knob]:
                 found.append((f"{which} {level.datum}", moved(k, which), 0.0, far))
     if case.mission.autopilot is not COPTER and case.family != "wing":
         found.append(("accept", accepted, 1.0, 250.0))
-    if case.family == "return":
+    if any(item.command == cmd.RTL for item in case.mission.items):
         found.append(("return", lambda c, v: replace(c, rtl_m=v), 300.0, -20.0))
     if case.family == "battery":
         found = [("battery", with_battery, 1e9, 0.0)]

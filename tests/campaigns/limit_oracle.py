@@ -66,6 +66,8 @@ class Flight:
         home = case.mission.home
         self.home = self.place(home.lat_e7, home.lon_e7)
         self.datum = self.ground(self.home)
+        self.shift_m = case.terrain_error_m * (1.0 if int(self.datum * 1e3) % 2 else -1.0)
+        """How far all of the vehicle's terrain is off, since it armed."""
 
     # -- places ------------------------------------------------------------------------------------------------------
 
@@ -104,8 +106,14 @@ class Flight:
             read = self.read(np.array([here[:2], en]))
             kept = here[2] - read[0] + read[1] if item.frame == 10 else here[2]
             return np.array([*en, kept])
-        base = {0: 0.0, 3: self.datum}.get(item.frame, float(self.read(en[None])[0]))
+        base = {0: 0.0, 3: self.datum}.get(item.frame, float(self.read(en[None])[0]) + self.shift_m)
         return np.array([*en, base + stored_m(item, self.autopilot)])
+
+    def around(self, item: MissionItem, middle: Floats, points: Floats) -> Floats:
+        """Points (N, 3) of a circle around ``middle`` at its altitude, in the item's frame."""
+        if item.frame == 10:
+            points[:, 2] += self.read(points[:, :2]) - self.read(middle[None, :2])
+        return points
 
     def straight(self, a: Floats, b: Floats, terrain: bool = False) -> Floats:
         """Points from ``a`` to ``b`` at an even slope; with ``terrain`` the height above ground changes evenly."""
@@ -130,14 +138,14 @@ class Flight:
         track, high = self.case.limits.track_error_m, self.case.limits.altitude_error_m
         here = np.array([*self.home, self.datum])
         begun, before = here, None  # where the vehicle truly is, and the way point before `here`
-        stops, circle = True, 0.0
+        stops, circle, left = True, 0.0, here  # `left`: a place on the circle
         for item, after in self.in_order():
             if item.command in TAKE_OFFS:
                 up = np.array([*self.home, self.datum + self.climbs_m(item)])
                 yield Line(self.straight(here, up), track, high, column=True)
                 here = begun = up
             elif item.command == 20:
-                yield from self.home_again(self.on_circle(here, circle) if circle > 0.0 else begun, here)
+                yield from self.home_again(left if circle > 0.0 else begun, here)
                 return
             elif item.command in LANDS:
                 over = np.array([*self.place(item.x, item.y), here[2]])
@@ -151,19 +159,18 @@ class Flight:
                     beyond = np.zeros(3) if item.params[0] > 0 or after is None else self.target(after, to) - to
                     yield Line(self.spline(here, to, leaves, beyond), track, high)
                 elif circle > 0.0:  # from anywhere on the circle
-                    yield Line(self.straight(self.on_circle(here, circle), to), track, high, angles=False)
+                    yield Line(self.straight(left, to, item.frame == 10), track, high, angles=False)
                 else:
-                    terrain = item.frame == 10
-                    error = self.case.terrain_error_m if terrain else 0.0
-                    edge = self.edge(item, here, to)
-                    yield Line(self.straight(here, edge, terrain), track, high + error)
+                    edge = self.around(item, to, self.edge(item, here, to)[None])[0]
+                    even = self.case.family != "frames"  # a shift is an error of height, which no angle counts
+                    yield Line(self.straight(here, edge, item.frame == 10), track, high, angles=even)
                     yield from self.cut(item, begun, here, to, after)
                 begun, circle = self.turn(item, begun, here, to, after), 0.0
                 before, here, stops = here, to, item.command != 82 and item.params[0] > 0
                 if item.command in CIRCLES:
                     circle = self.radius(item, to[2])
-                    yield Line(self.ring(to, circle), track, high, angles=False)
-                    begun = to
+                    yield Line(self.around(item, to, self.ring(to, circle)), track, high, angles=False)
+                    begun, left = to, self.around(item, to, self.on_circle(to, circle)[None])[0]
 
     def in_order(self) -> Iterator[tuple[MissionItem, MissionItem | None]]:
         """Items in the order flown, with at most three rounds of each jump; with each, the next item flown to."""

@@ -163,6 +163,20 @@ def test_a_plans_fence_that_is_not_read_is_told(fence: Any, words: str) -> None:
     assert str(read.unread_fence).startswith(f"the file's {words}") if words else read.unread_fence is None
 
 
+@pytest.mark.parametrize(
+    ("firmware", "kind", "named"),
+    [(12, 1, "fixed wing"), (12, 20, "VTOL"), (12, 10, "rover"), (12, "wing", "wing"), (12, 2, ""), (12, None, ""), (3, 1, ""),
+     (3, 20, "")],
+)  # fmt: skip
+def test_a_plan_for_a_kind_of_vehicle_that_is_flown_otherwise_is_not_judged(
+    firmware: int, kind: Any, named: str
+) -> None:
+    mission = PLAN["mission"] | {"firmwareType": firmware, "vehicleType": kind}
+    read = parse_plan(json.dumps(PLAN | {"mission": mission}), autopilot=None, where="a.plan")
+    assert [note.code for note in read.not_judged] == ["plan_for_other_kind"] * bool(named)
+    assert all(named in str(note) for note in read.not_judged)
+
+
 CORNERS = [[46.0, 14.0], [46.1, 14.0], [46.1, 14.1]]
 
 

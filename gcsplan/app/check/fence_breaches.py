@@ -16,9 +16,10 @@ import numpy as np
 
 from gcsplan.arrays import Floats
 from gcsplan.check.flight.corners import round_corners
-from gcsplan.check.flight.follow import follow
+from gcsplan.check.flight.follow import follow_in
 from gcsplan.check.judge import judge
 from gcsplan.check.motion.project import legs_in_plane
+from gcsplan.check.motion.stretch import on_globe
 from gcsplan.check.motion.turn_parameters import DEFAULTS, Tuning
 from gcsplan.check.verdict import Verdict
 from gcsplan.errors import CheckFailed, InputError
@@ -143,7 +144,7 @@ def _outside(
 ) -> list[Finding]:
     """One finding for each inclusion area that the flight, as `judge` follows it, leaves: the first leg that does."""
     stored = replace(mission, items=tuple(profile_of(mission.autopilot).stored(i) for i in mission.items))
-    flight = follow(stored, vehicle, world.ground_amsl, world.read_amsl, rtl_rel_home_m=rtl_rel_home_m)
+    flight = follow_in(world, stored, vehicle, rtl_rel_home_m=rtl_rel_home_m)
     round_corners(flight, stored, vehicle, world.frame, tuning)
     flown = [*flight.stretches, *flight.others]
     if not flown:
@@ -155,7 +156,7 @@ def _outside(
         if beyond_m.max() > 0.0:
             leg = int(np.argmax(beyond_m > 0.0))
             s, short_m = flown[plane.owner[leg]], float(beyond_m[leg])
-            lat, lon, amsl = s.end
+            lat, lon, amsl = on_globe(s.end)
             note, by_m = Note("far_outside_fence_area", s.seq, way=s.kind, zone=area.name), math.nan
             if math.isfinite(short_m):
                 note, by_m = Note("outside_fence_area", s.seq, way=s.kind, zone=area.name, by_m=short_m), short_m
@@ -194,14 +195,15 @@ def _beyond_shape_m(shape: Circle | Polygon, legs: Legs, scale: float) -> Floats
 
 
 def own_fence(
-    items: Sequence[MissionItem], verdict: Verdict, vehicle: Vehicle, world: World
+    items: Sequence[MissionItem], verdict: Verdict, vehicle: Vehicle, world: World, rtl_rel_home_m: float | None
 ) -> tuple[Verdict, tuple[Note, ...]]:
-    """``verdict`` plus the breaches of the file's own fence, and notes on that fence."""
+    """``verdict`` plus the breaches of the file's own fence, returns included, and notes on that fence."""
     if not items:
         return verdict, ()
     try:
         areas = areas_of(items, world.frame)
-        found = breaches(areas, verdict.mission, _plain(vehicle), world) if verdict.legs else []
+        flown, plain = verdict.mission, _plain(vehicle)
+        found = breaches(areas, flown, plain, world, rtl_rel_home_m=rtl_rel_home_m) if verdict.legs else []
     except InputError as error:
         why = Note("fence_unread", why=error.message)
         return replace(verdict, not_judged=(*verdict.not_judged, why)), ()

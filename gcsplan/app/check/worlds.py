@@ -24,7 +24,8 @@ from gcsplan.app.plan.flight_hours import beyond_forecast, beyond_hours
 from gcsplan.app.plan.way_home import home_of
 from gcsplan.arrays import Floats
 from gcsplan.check.flight.arc_waypoint import curve_bulge
-from gcsplan.check.judge import TERRAIN_ERROR_M, judge
+from gcsplan.check.judge import judge
+from gcsplan.check.motion.flight_state import TERRAIN_ERROR_M
 from gcsplan.check.returns.verdict import WayHome
 from gcsplan.check.verdict import Verdict
 from gcsplan.errors import InputError, UsageError
@@ -356,9 +357,9 @@ def judged(
         mission, vehicle, world, rtl_rel_home_m=request.rtl_rel_home_m, terrain_error_m=terrain_error_m,
         misses=parts.misses, times=parts.times or asks_home or hours is not None, wind=wind,
     )  # fmt: skip
-    verdict, fence_notes = own_fence(read.fence, verdict, vehicle, world)
-    more = [note for note in (read.unread_fence, beyond_hours(verdict, hours), beyond_forecast(verdict)) if note]
-    verdict = replace(verdict, not_judged=(*verdict.not_judged, *more))
+    verdict, fence_notes = own_fence(read.fence, verdict, vehicle, world, request.rtl_rel_home_m)
+    more = [note for note in (beyond_hours(verdict, hours), beyond_forecast(verdict)) if note]
+    verdict = replace(verdict, not_judged=(*verdict.not_judged, *read.not_judged, *more))
     points = read.rally if returns.rally else ()
     verdict, rally_notes = own_rally(points, read.fence, verdict, request, world)
     notes += [*fence_notes, *rally_notes]

@@ -15,6 +15,7 @@ from typing import Any
 from gcsplan.app.fleet.pipeline import plan
 from gcsplan.app.plan.model import Plan
 from gcsplan.app.plan.way_home import first_unsafe_m, homes_of
+from gcsplan.check.motion.stretch import on_globe, place_on
 from gcsplan.check.returns.proposal import ReturnProposal, best_first
 from gcsplan.check.returns.verdict import WayHome
 from gcsplan.check.verdict import LegFigures
@@ -97,7 +98,7 @@ def _place(legs: Sequence[LegFigures], at_m: float) -> tuple[float, float]:
     for leg in legs:
         if leg.horizontal_m > 0.0 and gone_m + leg.horizontal_m >= at_m:
             part = (at_m - gone_m) / leg.horizontal_m
-            lat, lon = (leg.start[k] + part * (leg.end[k] - leg.start[k]) for k in (0, 1))
+            lat, lon, _ = on_globe(place_on(leg.start, leg.end, part))
             return round(lat, 7), round(lon, 7)
         gone_m += leg.horizontal_m
     return round(legs[-1].end[0], 7), round(legs[-1].end[1], 7)

@@ -178,7 +178,7 @@ def unchecked_job(argument: str, url: str, sysid: int) -> tuple[UploadJob, list[
         name or file.stem, endpoint.url, replace(read.mission, name=name or file.stem, sysid=sysid),
         own={FENCE: read.fence, RALLY: read.rally},
     )  # fmt: skip
-    return job, [note for note in (*read.notes, read.unread_fence) if note]
+    return job, [*read.notes, *read.not_judged]
 
 
 def open_link(url: str) -> Link:
@@ -508,7 +508,7 @@ def verify_file(
             autopilot = None if file.suffix.lower() == ".plan" else _autopilot_of(link, sysid)
             read = read_mission_file(file, autopilot=autopilot)
             job = UploadJob(file.stem, link.url, replace(read.mission, sysid=sysid))
-            notes = tuple(note for note in (*read.notes, read.unread_fence) if note)
+            notes = (*read.notes, *read.not_judged)
             own = {FENCE: read.fence, RALLY: read.rally}
         options = session.SessionOptions(
             listen_s=LISTEN_S, timeout_s=timeout_s, rtl_rel_home_m=job.rtl_rel_home_m,

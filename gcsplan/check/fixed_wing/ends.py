@@ -38,7 +38,7 @@ from gcsplan.check.motion.circles import circle_reach_m
 from gcsplan.check.motion.flight_state import Aboard
 from gcsplan.check.motion.spline import towards
 from gcsplan.check.motion.stopping import about_turn_m
-from gcsplan.check.motion.stretch import SAME_PLACE_M, Place, Stretch, degree_m, flat_m, offset_m, place_on
+from gcsplan.check.motion.stretch import SAME_PLACE_M, Place, Stretch, degree_m, flat_m, offset_m, on_globe, place_on
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import MissionItem
@@ -260,7 +260,7 @@ def slant_findings(stretches: Sequence[Stretch], vehicle: Vehicle, world: World)
             limit = vehicle.limits.max_descent_deg
             if kind == "land" and s is mine[0] and steep > limit * 1.01 + 0.01:
                 note = Note("glides_too_steeply", s.seq, way="land", value_deg=steep, limit_deg=limit)
-                found.append(Finding(s.seq, "descent", note, *s.start, steep, limit, steep - limit, "deg"))
+                found.append(Finding(s.seq, "descent", note, *on_globe(s.start), steep, limit, steep - limit, "deg"))
     return found
 
 
@@ -335,7 +335,7 @@ def _low(s: Stretch, east: float, north: float, amsl: float, by: float, world: W
 def place_of(pilot: Aboard, item: MissionItem) -> Place | None:
     if not pilot.has_place(item):
         return None
-    place = (item.lat_deg, item.lon_deg, 0.0)
+    place = (*pilot.place(item), 0.0)
     return place if flat_m(pilot.home, place) > NO_COURSE_M else None
 
 

@@ -15,10 +15,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from gcsplan.check.motion.flight_state import Aboard
+from gcsplan.check.motion.flight_state import Aboard, reads_ground
 from gcsplan.check.motion.stretch import Place
 from gcsplan.mavlink.mission import commands as cmd
-from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import MissionItem
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot
@@ -49,7 +48,7 @@ def fly_arc(pilot: Aboard, seq: int, item: MissionItem, after: MissionItem | Non
     """
     target, angle_deg = pilot.target(item), item.params[0]
     last = pilot.flight.stretches[-1] if pilot.flight.stretches else None
-    placed = pilot.airborne and pilot.known and pilot.has_place(item) and item.frame not in (m.TERRAIN, 11)
+    placed = pilot.airborne and pilot.known and pilot.has_place(item) and not reads_ground(item)
     circled = last is not None and last.kind == "loiter" and last.reach_m > 0.0  # it may be left anywhere
     if pilot.autopilot is not Autopilot.ARDUCOPTER or target is None or not placed or circled:
         return False
@@ -65,6 +64,7 @@ def fly_arc(pilot: Aboard, seq: int, item: MissionItem, after: MissionItem | Non
     for a, b in pairwise(places):
         pilot.add(seq, "cruise", a, b, reach_m=bulge_m, on_path=True, steep=steep)
     pilot.pace, pilot.at, pilot.direction = pace, target, None
+    pilot.settled(item)
     pilot.note(Note("arcs_by_version"))
     return True
 

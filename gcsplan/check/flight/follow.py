@@ -34,16 +34,17 @@ from gcsplan.check.flight.route import fly_all
 from gcsplan.check.flight.times import DAY_S
 from gcsplan.check.motion.circles import PLANE_LOITER_RADIUS_M, circle_reach_m, circle_widened
 from gcsplan.check.motion.commands import flown_otherwise, moves_nothing, why_lost
-from gcsplan.check.motion.flight_state import Aboard
+from gcsplan.check.motion.flight_state import TERRAIN_ERROR_M, Aboard, reads_ground
 from gcsplan.check.motion.return_rules import RETURN_RULES, returned
 from gcsplan.check.motion.spline import NO_DIRECTION, chords, slowed, towards
 from gcsplan.check.motion.stopping import about_turn_m
-from gcsplan.check.motion.stretch import Flight, Place, StretchKind, flat_m
+from gcsplan.check.motion.stretch import Flight, Place, StretchKind, flat_m, place_on
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Vehicle
+from gcsplan.world.world import World
 
 COPTER_CIRCLE_RADIUS_M = 10.0  # ArduCopter CIRCLE_RADIUS, default
 LEAST_CLIMB_M = {Autopilot.ARDUCOPTER: 1.0, Autopilot.PX4: 2.5}  # takeoff_start; MIS_TAKEOFF_ALT, default
@@ -57,16 +58,30 @@ def follow(
     vehicle: Vehicle,
     ground_amsl: Callable[[float, float], float],
     read_amsl: Callable[[float, float], float] | None = None,
+    read_change_m: Callable[[float, float, float], float] | None = None,
     *,
     rtl_rel_home_m: float | None = None,
+    terrain_error_m: float = TERRAIN_ERROR_M,
 ) -> Flight:
     """Return the flight that ``mission`` (as stored on board) leads to.
 
     ``ground_amsl(lat_deg, lon_deg)`` is the terrain, NaN where unknown; ``read_amsl`` likewise what the vehicle takes
-    for it in the terrain frame, by default the same. ``rtl_rel_home_m`` is the altitude of a return above home; without
-    it an RTL is not judged.
+    for it in the terrain frame, by default the same, and ``read_change_m(lat_deg, lon_deg, reach_m)`` how far that
+    changes around a place. ``rtl_rel_home_m`` is the altitude of a return above home; without it an RTL is not judged.
     """
-    return fly_all(mission, lambda: _Pilot(mission, vehicle, ground_amsl, rtl_rel_home_m, read_amsl))
+    terms = ground_amsl, rtl_rel_home_m, read_amsl, read_change_m, terrain_error_m
+    return fly_all(mission, lambda: _Pilot(mission, vehicle, *terms))
+
+
+def follow_in(
+    world: World, mission: Mission, vehicle: Vehicle, *, rtl_rel_home_m: float | None = None,
+    terrain_error_m: float = TERRAIN_ERROR_M,
+) -> Flight:  # fmt: skip
+    """`follow` in a world, whose terrain the vehicle has on board."""
+    return follow(
+        mission, vehicle, world.ground_amsl, world.read_amsl, world.read_change_m, rtl_rel_home_m=rtl_rel_home_m,
+        terrain_error_m=terrain_error_m,
+    )  # fmt: skip
 
 
 class _Pilot(Aboard):
@@ -83,7 +98,7 @@ class _Pilot(Aboard):
 
     @property
     def state(self) -> Hashable:
-        return self.at, self.airborne, self.known, self.pace, self.circle_m, self.direction
+        return self.at, self.off_m, self.airborne, self.known, self.pace, self.circle_m, self.direction
 
     def fly(self, seq: int, item: MissionItem) -> None:
         flown = len(self.flight.stretches)
@@ -185,17 +200,21 @@ class _Pilot(Aboard):
                 self.flight.not_judged.append(Note("no_take_off", seq))
             self.airborne = self.known = True
             self.at = target
-        terrain, away_m = item.frame in (m.TERRAIN, 11), flat_m(self.at, target) if short_m > 0.0 else 0.0
-        if short_m > 0.0 and away_m > short_m and not terrain:
-            part = 1.0 - short_m / away_m
-            edge = tuple(a + part * (b - a) for a, b in zip(self.at[:2], target[:2], strict=True))
-            self._leg(seq, "cruise", (edge[0], edge[1], target[2]), terrain=False)
+        terrain, away_m = reads_ground(item), flat_m(self.at, target) if short_m > 0.0 else 0.0
+        if short_m > 0.0 and away_m > short_m:
+            lat, lon, _ = place_on(self.at, target, 1.0 - short_m / away_m)
+            above_m = self.read(lat, lon) - self.read(*target[:2]) if terrain else 0.0
+            if math.isnan(above_m):
+                self._lose(seq, item)
+                return
+            self._leg(seq, "cruise", (lat, lon, target[2] + above_m), terrain=terrain)
         self._leg(seq, "cruise", target, terrain=terrain, hold_s=hold_s)
+        self.settled(item)
 
     def _curve(self, seq: int, item: MissionItem) -> None:
         """A spline as ArduCopter flies it; both a pass through its beginning and a stop there are judged."""
         target, after = self.target(item), self._next(seq)
-        terrain = any(i is not None and i.frame in (m.TERRAIN, 11) for i in (item, after))
+        terrain = any(i is not None and reads_ground(i) for i in (item, after))
         copter = self.autopilot is Autopilot.ARDUCOPTER
         known = self.airborne and self.known
         if not copter or target is None or terrain or not known or after is None or after.command == cmd.ARC_WAYPOINT:
@@ -215,6 +234,7 @@ class _Pilot(Aboard):
             for (a, b), slopes in zip(pairwise(places), steep, strict=True):
                 fly(seq, "cruise", a, b, band_m=bulge_m, reach_m=bulge_m, on_path=True, steep=slopes)
         self.pace, self.at, self.direction = pace, target, None if self.hold(item) else arrives
+        self.settled(item)
         if hold_s := self.hold(item):
             self.add(seq, "loiter", target, target, hold_s=hold_s)
         self.note(Note("splines_by_version"))
@@ -261,6 +281,9 @@ class _Pilot(Aboard):
         if plane:
             self.note(circle_widened(seq, reach_m, self.at[2]))
             reach_m = self._circles_m(reach_m, self.at[2])
+        if not self.circles_over_ground(item, reach_m):
+            self._lose(seq, item)
+            return
         self.add(seq, "loiter", self.at, self.at, reach_m=reach_m, hold_s=hold_s, turns=turns)
         self.direction = None
 
@@ -285,7 +308,7 @@ class _Pilot(Aboard):
         before = self.at
         plane = self.autopilot is Autopilot.ARDUPLANE
         reach_m = self._circle(seq, item.params[1]) if plane else 0.0
-        if plane and is_wing(self.vehicle) and circle_up(self, seq, item, reach_m):
+        if plane and is_wing(self.vehicle) and not reads_ground(item) and circle_up(self, seq, item, reach_m):
             return
         self._go(seq, item)
         if not self.known:
@@ -297,6 +320,9 @@ class _Pilot(Aboard):
             around = (*place, 0.5 * (low + high))
             self.note(circle_widened(seq, reach_m, high))
             reach_m = self._circles_m(reach_m, high)
+            if not self.circles_over_ground(item, reach_m):
+                self._lose(seq, item)
+                return
             self.add(seq, "loiter", around, around, band_m=0.5 * (high - low), reach_m=reach_m)
             self.low_m, self.around_m = min(REACHED_M, self.at[2] - low), reach_m
         elif self.autopilot is Autopilot.PX4 and before[2] != self.at[2]:  # level first, then up or down there
@@ -327,8 +353,8 @@ class _Pilot(Aboard):
         self.landed = True
 
     def _fly_to_landing(self, seq: int, item: MissionItem) -> None:
-        here, terrain = self.at, item.frame in (m.TERRAIN, 11) and self.autopilot is Autopilot.ARDUCOPTER
-        level = (item.lat_deg, item.lon_deg, here[2])
+        here, terrain = self.at, reads_ground(item) and self.autopilot is Autopilot.ARDUCOPTER
+        level = (*self.place(item), here[2])
         if flat_m(here, level) <= 0.02:
             self.at = level
             return
@@ -336,6 +362,8 @@ class _Pilot(Aboard):
         follows = (*level[:2], self.read(*level[:2]) + agl)
         self.at = follows if terrain and not math.isnan(follows[2]) else level
         self.add(seq, "land", here, self.at, terrain=terrain)
+        if terrain:
+            self.settled(item)
         if self.autopilot is Autopilot.ARDUCOPTER and not terrain and not math.isnan(follows[2]):
             down = (*level[:2], min(follows[2], self.ground(*level[:2])))
             self.instead(seq, "land", here, follows, terrain=True)
@@ -347,6 +375,8 @@ class _Pilot(Aboard):
             self.flight.not_judged.append(why)
             self.landed = True
             return
+        if RETURN_RULES[self.autopilot].climbs_first and self.at[2] + self.off_m <= self.home[2] + self.rtl_rel_home_m:
+            self.off_m = 0.0  # it climbs to the same altitude from wherever it is
         self.pace = replace(self.pace, speed_m_s=self.vehicle.return_speed_m_s or self.pace.speed_m_s)
         flown, instead = returned(
             lambda start, end, **more: self.stretch(seq, "rtl", start, end, more),

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 from gcsplan.check.motion.commands import Pace
 from gcsplan.check.motion.spline import Direction
-from gcsplan.check.motion.stretch import Flight, Place, Stretch, StretchKind
+from gcsplan.check.motion.stretch import Flight, Place, Stretch, StretchKind, near_lon
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
@@ -18,9 +19,17 @@ from gcsplan.world.geodesy.atmosphere import true_per_indicated
 PLANE_GLIDE_SLOPE_MIN_M = 15.0  # ArduPlane GLIDE_SLOPE_MIN, default
 PLANE_LOW_M = 20.0  # ArduPlane setup_glide_slope: below this height above home it climbs at once
 
+TERRAIN_ERROR_M = 30.0
+"""ArduPilot shifts all terrain by up to this, m, when it arms; heights that it takes from the ground are as far off."""
+
 PX4_DOWN_M_S = 1.5  # MPC_Z_VEL_MAX_DN, default
 PX4_SLOW_BELOW_M = 5.0
 """MPC_LAND_ALT2, default: below this height over home a landing PX4 is as slow as MPC_LAND_SPEED."""
+
+
+def reads_ground(item: MissionItem) -> bool:
+    """Whether the item's altitude is above the ground that the vehicle reads."""
+    return m.FRAME_SYNONYMS.get(item.frame, item.frame) == m.TERRAIN
 
 
 class Aboard:
@@ -33,12 +42,16 @@ class Aboard:
         ground_amsl: Callable[[float, float], float],
         rtl_rel_home_m: float | None,
         read_amsl: Callable[[float, float], float] | None = None,
+        read_change_m: Callable[[float, float, float], float] | None = None,
+        terrain_error_m: float = TERRAIN_ERROR_M,
     ) -> None:
         self.flight = Flight()
         self.autopilot = mission.autopilot
         self.vehicle = vehicle
         self.ground = ground_amsl
         self.read = ground_amsl if read_amsl is None else read_amsl
+        self.read_change_m, self.terrain_error_m = read_change_m, terrain_error_m
+        self.off_m = 0.0  # how far `at` may be from its altitude, because it was taken from the ground
         self.rtl_rel_home_m = rtl_rel_home_m
         self.pace = Pace.of(vehicle)
         self.circle_m = 0.0
@@ -86,11 +99,33 @@ class Aboard:
     def stretch(self, seq: int, kind: StretchKind, start: Place, end: Place, more: dict[str, object]) -> Stretch:
         """One stretch at the present pace."""
         fields: dict[str, object] = {"rates_m_s": self.pace.rates_m_s, "jumped_from": self.jumped_from} | more
-        return Stretch(seq, kind, start, end, self.pace.speed_m_s, **fields)  # type: ignore[arg-type]
+        made = Stretch(seq, kind, start, end, self.pace.speed_m_s, **fields)  # type: ignore[arg-type]
+        return made if made.terrain or not self.off_m else replace(made, band_m=made.band_m + self.off_m)
+
+    def settled(self, item: MissionItem) -> None:
+        """The vehicle is at the item: its altitude is the item's own, or as far off it as the ground that it read."""
+        if reads_ground(item):
+            self.off_m = self.terrain_error_m
+        elif not self.keeps_altitude(item):
+            self.off_m = 0.0
+
+    def circles_over_ground(self, item: MissionItem, reach_m: float) -> bool:
+        """Count how far a circle around the present place follows the ground up and down; False: it is not known."""
+        if not reads_ground(item) or reach_m <= 0.0:
+            return True
+        change_m = self.read_change_m(*self.at[:2], reach_m) if self.read_change_m else math.nan
+        if math.isnan(change_m):
+            return False
+        self.off_m += change_m
+        return True
 
     def has_place(self, item: MissionItem) -> bool:
         """Whether the item holds a place; latitude = longitude = 0 means "here"."""
         return item.frame != m.NO_POSITION and not (item.x == 0 and item.y == 0)
+
+    def place(self, item: MissionItem) -> tuple[float, float]:
+        """The item's latitude, and its longitude on home's side of the antimeridian."""
+        return item.lat_deg, near_lon(item.lon_deg, self.home[1])
 
     def off_africa(self, item: MissionItem) -> bool:
         """Whether the item goes to latitude = longitude = 0, for an autopilot that takes this as an ordinary place."""
@@ -99,20 +134,24 @@ class Aboard:
 
     def target(self, item: MissionItem) -> Place | None:
         """The place that the item leads to; None if it is unknown."""
-        lat, lon = (item.lat_deg, item.lon_deg) if self.has_place(item) else self.at[:2]
+        lat, lon = self.place(item) if self.has_place(item) else self.at[:2]
         if not self.has_place(item) and not self.known:
             return None
         amsl = self.altitude(item, (lat, lon, self.at[2]))
         return None if amsl is None else (lat, lon, amsl)
+
+    def keeps_altitude(self, item: MissionItem) -> bool:
+        """Whether the item's altitude of 0 means the altitude that the vehicle has."""
+        keeps = self.autopilot is Autopilot.ARDUCOPTER and item.command != cmd.TAKEOFF
+        keeps = keeps or (self.autopilot is Autopilot.ARDUPLANE and not self.has_place(item))
+        return item.z == 0.0 and keeps
 
     def altitude(self, item: MissionItem, here: Place) -> float | None:
         """The item's altitude AMSL at ``here``, in its frame; None if the ground or the frame is unknown."""
         frame = m.FRAME_SYNONYMS.get(item.frame, item.frame)
         if not math.isfinite(item.z):
             return None
-        keeps = self.autopilot is Autopilot.ARDUCOPTER and item.command != cmd.TAKEOFF
-        keeps = keeps or (self.autopilot is Autopilot.ARDUPLANE and not self.has_place(item))
-        if item.z == 0.0 and keeps:
+        if self.keeps_altitude(item):
             if not self.known:
                 return None
             if frame != m.TERRAIN or self.autopilot is Autopilot.ARDUPLANE:

@@ -14,7 +14,8 @@ from gcsplan.notes.note import Note
 
 StretchKind = Literal["takeoff", "cruise", "land", "loiter", "rtl"]
 Place = tuple[float, float, float]
-"""Latitude, longitude in degrees, altitude AMSL in metres."""
+"""Latitude, longitude in degrees, altitude AMSL in metres. Longitudes of a flight lie within half a turn of home's,
+also beyond ±180°; figures and findings have them by `on_globe`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,6 +99,19 @@ class Flight:
         self.unreached += [one for one in part.unreached if one not in self.unreached]
 
 
+def near_lon(lon_deg: float, by_deg: float) -> float:
+    """The same longitude within half a turn of another one: so a line between two places never goes round the globe.
+
+    ``by_deg`` 0: as it is written, within ±180°.
+    """
+    return lon_deg + 360.0 * round((by_deg - lon_deg) / 360.0)
+
+
+def on_globe(place: Place) -> Place:
+    """A place of a flight, with its longitude as it is written."""
+    return place[0], near_lon(place[1], 0.0), place[2]
+
+
 SAME_PLACE_M = 0.02
 """Places nearer to each other than this count as one, m."""
 
@@ -116,7 +130,8 @@ def place_on(a: Place, b: Place, part: float) -> Place:
     """The place at a ``part`` of the straight way from ``a`` to ``b``; up to 0 it is ``a``, from 1 it is ``b``."""
     if part <= 0.0 or part >= 1.0:
         return a if part <= 0.0 else b
-    return a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1]), a[2] + part * (b[2] - a[2])
+    lon = a[1] + part * (near_lon(b[1], a[1]) - a[1])
+    return a[0] + part * (b[0] - a[0]), lon, a[2] + part * (b[2] - a[2])
 
 
 @lru_cache(maxsize=1024)

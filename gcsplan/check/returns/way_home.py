@@ -27,10 +27,10 @@ import numpy as np
 from gcsplan.arrays import Floats
 from gcsplan.check.battery import battery_home
 from gcsplan.check.flight.corners import round_corners
-from gcsplan.check.flight.follow import follow
+from gcsplan.check.flight.follow import follow_in
 from gcsplan.check.flight.ways_home import WaysHome
-from gcsplan.check.judge import TERRAIN_ERROR_M
 from gcsplan.check.motion.commands import LAND_STARTS
+from gcsplan.check.motion.flight_state import TERRAIN_ERROR_M
 from gcsplan.check.motion.project import why_unknown, with_error_of_home
 from gcsplan.check.motion.return_rules import ASIDE_PARTS, RETURN_RULES, at_home_m, speed_home_m_s
 from gcsplan.check.motion.stopping import circle_home_m
@@ -88,7 +88,7 @@ def way_home(
     ground, unsure = world.ground_amsl(lat, lon), why_unknown(mission.home, vehicle, world)
     vehicle = with_error_of_home(vehicle, mission.home, world)
     judged_m = rule.default_rel_home_m if rtl_rel_home_m is None else rtl_rel_home_m
-    flight = follow(stored, vehicle, world.ground_amsl, world.read_amsl, rtl_rel_home_m=judged_m)
+    flight = follow_in(world, stored, vehicle, rtl_rel_home_m=judged_m, terrain_error_m=terrain_error_m)
     if verdict.legs:
         round_corners(flight, stored, vehicle, world.frame)
     trace = trace_of(flight, vehicle, world, terrain_error_m) if verdict.legs else None

@@ -71,7 +71,8 @@ class MissionFileRead:
     """A mission from a file, with ``notes`` for the user.
 
     ``fence`` and ``rally`` are the wire items of the file's other two lists, empty if it has none; ``unread_fence``
-    says what of its fence could not be read.
+    says what of its fence could not be read, ``other_kind`` that it is for a kind of vehicle that the check does not
+    know to fly.
     """
 
     mission: Mission
@@ -79,6 +80,12 @@ class MissionFileRead:
     fence: tuple[MissionItem, ...] = ()
     rally: tuple[MissionItem, ...] = ()
     unread_fence: Note | None = None
+    other_kind: Note | None = None
+
+    @property
+    def not_judged(self) -> tuple[Note, ...]:
+        """What a check of the mission leaves out because of its file."""
+        return tuple(note for note in (self.unread_fence, self.other_kind) if note is not None)
 
 
 def in_degrees(command: int, frame: int) -> bool:

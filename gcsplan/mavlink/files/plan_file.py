@@ -46,7 +46,7 @@ from gcsplan.mavlink.files.plan_fence import (
     rally_json,
     unread_keys,
 )
-from gcsplan.mavlink.mission.autopilots import ARDUPILOTMEGA, COPTERS, PLANES, PX4
+from gcsplan.mavlink.mission.autopilots import ARDUPILOTMEGA, COPTERS, PLANES, PX4, profile_of, type_name
 from gcsplan.mavlink.mission.commands import (
     DO_CHANGE_SPEED,
     DO_JUMP,
@@ -204,7 +204,7 @@ def parse_plan(text: str, *, autopilot: Autopilot | None, where: str, home_hint:
     if others and not theirs:
         notes.append(Note("plan_keys_unread", keys=tuple(k[:40] for k in others[:8])))
     unread = Note("plan_fence_unread", keys=unread_fence, cure=RESAVE) if unread_fence else None
-    return MissionFileRead(Mission(pilot, home, items), tuple(notes), fence, rally, unread)
+    return MissionFileRead(Mission(pilot, home, items), tuple(notes), fence, rally, unread, _other_kind(mission, pilot))
 
 
 def _json(text: str, where: str) -> Any:
@@ -257,6 +257,15 @@ def _autopilot(mission: dict[str, Any], requested: Autopilot | None, where: str,
             where=f"{where}: mission.firmwareType",
         )
     return requested or stated  # type: ignore[return-value]  # one of them is there
+
+
+def _other_kind(mission: dict[str, Any], pilot: Autopilot) -> Note | None:
+    """A note on the file's kind of vehicle, if missions for this autopilot are judged as others fly them."""
+    kind, profile = mission.get("vehicleType"), profile_of(pilot)
+    if kind in (None, 0, *profile.judged_types):
+        return None
+    named = type_name(kind) if isinstance(kind, int) else str(kind)[:40]
+    return Note("plan_for_other_kind", kind=named, autopilot=profile.label)
 
 
 def _home(value: object, hint: Home | None, place: str, notes: list[Note]) -> Home:

@@ -14,7 +14,7 @@ import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.check.fixed_wing.arcs import bend
-from gcsplan.check.flight.follow import follow
+from gcsplan.check.flight.follow import follow_in
 from gcsplan.check.motion.project import ends_of
 from gcsplan.check.motion.stretch import Flight, Stretch
 from gcsplan.errors import InputError
@@ -183,7 +183,7 @@ def make_track(
     ``not_flown`` lists the parts that are not understood or cannot be simulated. Raises ValueError if the mission does
     not fly at all.
     """
-    flight = follow(mission, vehicle, world.ground_amsl, world.read_amsl, rtl_rel_home_m=rtl_rel_home_m)
+    flight = follow_in(world, mission, vehicle, rtl_rel_home_m=rtl_rel_home_m, terrain_error_m=0.0)
     if not flight.stretches:
         raise ValueError(f"{vehicle.name}: the mission flies nowhere")
     if vehicle.lays_curves:

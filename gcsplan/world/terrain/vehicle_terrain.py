@@ -16,11 +16,15 @@ from gcsplan.arrays import Floats
 from gcsplan.world.geodesy.frame import Frame
 from gcsplan.world.geometry.surface import GridMap, Surface
 from gcsplan.world.terrain.cell import Cell
-from gcsplan.world.terrain.grid import DEGREE_E7, SPACING_M, PostHeights, TerrainGrid, cell_at
+from gcsplan.world.terrain.grid import DEGREE_E7, SPACING_M, PostHeights, TerrainGrid, cell_at, cells_of
 
 TERRAIN_PARTS = 256
 """Parts of a line in which it is looked at for borders of degree tiles."""
 BISECTIONS = 40
+MOST_POSTS_AROUND = 1000
+"""Reach of `VehicleTerrain.change_m`, in posts; beyond it the ground counts as not known."""
+LEAST_DEGREE_M = 110_500.0
+"""Less than a degree of latitude anywhere, m."""
 
 TerrainPiece = tuple[float, float, Surface]
 """A part of a line, from and to (0 to 1), and the vehicle's ground under it."""
@@ -49,6 +53,28 @@ class VehicleTerrain:
     def amsl(self, lat_deg: float, lon_deg: float) -> float:
         """The height that the vehicle reads at a place, m AMSL; NaN where unknown."""
         return float(self.posts.amsl(lat_deg * 1e7, lon_deg * 1e7))
+
+    def change_m(self, lat_deg: float, lon_deg: float, reach_m: float) -> float:
+        """How far the ground that it reads within ``reach_m`` of a place may be from the ground that it reads there, m.
+
+        Never less than it is, for all posts around count; NaN where one of them is unknown, or the reach too long.
+        """
+        grid = self.posts.grid
+        if not reach_m <= MOST_POSTS_AROUND * grid.spacing_m:
+            return math.nan
+        part = reach_m / LEAST_DEGREE_M
+        wide = part / max(math.cos(math.radians(abs(lat_deg) + part)), 0.01)
+        lat = 1e7 * (lat_deg + part * np.array([-1.0, -1.0, 1.0, 1.0]))
+        lon = 1e7 * (lon_deg + wide * np.array([-1.0, 1.0, -1.0, 1.0]))
+        here, most = self.amsl(lat_deg, lon_deg), 0.0
+        for cell in cells_of(lat, lon):
+            north, east = (
+                (math.floor(m.min() / grid.spacing_m) - 1, math.ceil(m.max() / grid.spacing_m) + 1)
+                for m in grid.offset_m(cell, lat, lon)
+            )
+            off_m = float(np.abs(self.posts.window(cell, north, east) - here).max())
+            most = off_m if math.isnan(off_m) else max(most, off_m)  # a later tile keeps NaN: no number is above it
+        return most
 
     def ground_at(self, east_m: ArrayLike, north_m: ArrayLike) -> Floats:
         """The heights that it reads at points of the plane, m AMSL; NaN where unknown."""

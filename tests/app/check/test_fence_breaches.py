@@ -77,7 +77,7 @@ def own(items: list[MissionItem], path: list[list[float]] = OVER, half_m: float 
         mission = replace(mission, items=(*mission.items[:2], *mission.items[-2:]))
     verdict = judge(mission, craft, where)
     assert verdict.safe is True
-    return fence_breaches.own_fence(items, verdict, craft, where)[0]
+    return fence_breaches.own_fence(items, verdict, craft, where, None)[0]
 
 
 def ring_of(command: int, *metres: tuple[float, float]) -> list[MissionItem]:
@@ -123,7 +123,23 @@ def test_an_inclusion_area_holds_corners_as_they_are_cut() -> None:
         cut = replace(mission, items=tuple(items))
         verdict = judge(cut, craft, where)
         assert verdict.safe is True
-        assert fence_breaches.own_fence(ring, verdict, craft, where)[0].safe is safe, radius_m
+        assert fence_breaches.own_fence(ring, verdict, craft, where, None)[0].safe is safe, radius_m
+
+
+@pytest.mark.parametrize("inclusion", [False, True])
+def test_a_return_breaches_its_files_own_fence_as_any_leg_does(inclusion: bool) -> None:
+    """Out along two sides of a square, and home over its diagonal."""
+    where, craft = world(), vehicle()
+    path = FlightPath(np.array([[0.0, 0, 420], [3000, 0, 420], [3000, 3000, 420]]))
+    mission = build_mission(path, where, craft, (36.6, -84.3), Order(end="rtl"))
+    verdict = judge(mission, craft, where, rtl_rel_home_m=120.0)
+    assert verdict.safe is True
+    if inclusion:
+        areas = ring_of(5001, (-200, -200), (3200, -200), (3200, 3200), (2800, 3200), (2800, 200), (-200, 200))
+    else:
+        areas = ring_of(5002, (1400, 1400), (1600, 1400), (1600, 1600), (1400, 1600))
+    judged, _ = fence_breaches.own_fence(areas, verdict, craft, where, 120.0)
+    assert [(f.seq, f.kind) for f in judged.findings] == [(len(mission.items), "fence")]
 
 
 def test_a_fence_that_crosses_itself_is_not_judged() -> None:
@@ -147,6 +163,6 @@ def test_a_plan_files_own_fence_is_read_and_judged(tmp_path: Path) -> None:
         file.write_text(write_plan(mission, fence=fence.items))
         read = read_mission_file(file, autopilot=COPTER)
         assert read.fence == fence.items
-        verdict, told = fence_breaches.own_fence(read.fence, judge(mission, craft, where), craft, where)
+        verdict, told = fence_breaches.own_fence(read.fence, judge(mission, craft, where), craft, where, None)
         assert "1 area to stay out of" in str(told[0])
         assert verdict.safe is safe

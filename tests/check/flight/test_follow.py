@@ -159,6 +159,31 @@ def test_a_landing_elsewhere_in_terrain_frame_keeps_its_height_above_ground() ->
     assert down.end[2] == pytest.approx(GROUND_M + 200)
 
 
+def test_what_follows_a_leg_above_ground_is_as_far_off_as_the_ground_it_read() -> None:
+    """Until it has flown to an altitude of another frame; at 0 m it keeps the one that it has."""
+    low, over = at(cmd.WAYPOINT, 0.001, 0, 80, m.TERRAIN), at(cmd.WAYPOINT, 0.002, 0, 80)
+    kept, last = at(cmd.WAYPOINT, 0.003, 0, 0, m.GLOBAL), at(cmd.LAND, 0.004, 0, 0)
+    assert [s.band_m for s in fly_over_a_slope(TAKEOFF, low, over, over).stretches] == [0.0, 0.0, 30.0, 0.0]
+    assert [s.band_m for s in fly_over_a_slope(TAKEOFF, low, kept, last).stretches] == [0.0, 0.0, 30.0, 30.0, 30.0]
+    home = MissionItem(cmd.RTL, 2)
+    near = fly_over_a_slope(TAKEOFF, low, home, rtl_rel_home_m=120.0).stretches[2:]
+    assert {s.band_m for s in near} == {30.0}  # 100 m above home, or up to 130 m
+    far = fly_over_a_slope(TAKEOFF, low, home, rtl_rel_home_m=131.0).stretches[2:]
+    assert {s.band_m for s in far} == {0.0}  # it climbs to the same altitude from wherever it is
+
+
+def test_a_circle_above_ground_rises_and_falls_with_it() -> None:
+    """A plane and a copter; where the ground around is not known, the circle is not judged."""
+    ring = MissionItem(cmd.LOITER_TURNS, m.TERRAIN, (1, 0, 50, 0), m.degrees_e7(36.601), m.degrees_e7(-84.3), 80)
+    for pilot, up in ((Autopilot.ARDUCOPTER, TAKEOFF), (Autopilot.ARDUPLANE, VTOL_TAKEOFF)):
+        mission, grounds = Mission(pilot, HOME, (up, ring)), [lambda lat, lon: GROUND_M] * 2
+        flight = follow(mission, vehicle(pilot), *grounds, lambda lat, lon, reach_m: 0.1 * reach_m)
+        circle = flight.stretches[-1]
+        assert circle.reach_m > 0.0
+        assert circle.band_m == pytest.approx(30.0 + 0.1 * circle.reach_m)
+        assert unknown(follow(mission, vehicle(pilot), *grounds)) == [cmd.LOITER_TURNS]
+
+
 def test_a_landing_elsewhere_is_judged_both_level_and_along_the_ground() -> None:
     flight = fly_over_a_slope(TAKEOFF, at(cmd.LAND, -0.01, 0, 0))
     over, down = flight.instead  # ArduCopter before 4.6 with terrain data

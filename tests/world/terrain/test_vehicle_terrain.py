@@ -59,3 +59,22 @@ def test_a_line_over_the_border_of_a_degree_tile_is_cut_there() -> None:
 def test_sources_that_differ_are_told_as_far_as_posts_lie() -> None:
     assert terrain(47.3, 8.3).spread_at(np.zeros(3), np.zeros(3)).tolist() == [0.0, 0.0, 0.0]
     assert terrain(47.3, 8.3, high=7.0).spread_at(np.array([0.0]), np.array([0.0])) == pytest.approx([7.0])
+
+
+@pytest.mark.parametrize(("lat_deg", "lon_deg"), [(47.3, 8.3), (48.0, 8.0), (-40.0, 180.0)])
+def test_around_a_place_the_ground_changes_by_no_more_than_it_says(lat_deg: float, lon_deg: float) -> None:
+    """Within one tile, and where four meet: against thousands of places that the vehicle reads."""
+    known, rng = terrain(lat_deg, lon_deg), np.random.default_rng(2)
+    for reach_m in (5.0, 60.0, 400.0):
+        (east, north), (a, r) = rng.uniform(-300.0, 300.0, 2), rng.uniform(0.0, 1.0, (2, 3000))
+        middle, (lat, lon) = known.ground_at(east, north), Frame(lat_deg, lon_deg).to_degrees(east, north)
+        way = reach_m * np.sqrt(r) * np.array([np.cos(2.0 * np.pi * a), np.sin(2.0 * np.pi * a)])
+        most_m = float(np.abs(known.ground_at(east + way[0], north + way[1]) - middle).max())
+        assert most_m <= known.change_m(lat, lon, reach_m) + 1e-6
+        assert known.change_m(lat, lon, reach_m) <= 0.03 * (reach_m + 250.0) + 1.0  # corners of the square around
+
+
+def test_around_unknown_posts_or_too_far_the_change_is_unknown() -> None:
+    assert math.isnan(terrain(47.3, 8.3).change_m(47.3, 8.3, 5000.0))
+    assert math.isnan(terrain(47.3, 8.3).change_m(47.3, 8.3, 200_000.0))
+    assert math.isnan(terrain(47.3, 8.3).change_m(47.3, 8.3, math.nan))
