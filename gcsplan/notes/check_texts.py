@@ -113,6 +113,11 @@ CHECK_TEXTS = {
         "ArduPlane widens its circle of {radius_m:distance} in the thin air at {amsl_m:amsl.0} to about "
         "{flown_m:distance.0}; it is judged with {judged_m:distance.0 up}, for a hot day"
     ),
+    "circle_too_banked": (
+        "a circle of {radius_m:distance} at {speed_m_s:speed} needs a bank of {bank_deg:.0f}°, and ArduPlane's "
+        "ROLL_LIMIT_DEG is {most_deg:g}°: the circle that it flies is wider, and not judged; give a larger radius, or "
+        "a lower speed"
+    ),
     "climb_rate_uncounted": "a rate of climb or descent for PX4 is not counted in the time",
     "gate_missed": (
         "it may come to its gate {by_s:seconds.1} too late for the gate's second, and would wait there until the next "

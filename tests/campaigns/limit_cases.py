@@ -198,6 +198,7 @@ def make_mission(
     kinds = [kind] * (len(points) - 1)
     if family == "frames":
         kinds = rng.choice([m.RELATIVE, m.GLOBAL, m.TERRAIN], count).tolist()
+        points[1:, 2] += np.where(np.array(kinds) == m.TERRAIN, rng.uniform(0.0, 80.0, count), 0.0)  # its error is 30 m
     way = [
         item(cmd.WAYPOINT, p, k, float(rng.choice([0.0, 0.0, 3.0])), accept())
         for p, k in zip(points[1:], kinds, strict=True)

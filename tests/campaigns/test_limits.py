@@ -35,6 +35,8 @@ def test_nothing_that_is_called_safe_at_the_limit_is_unsafe() -> None:
         (700239, "spline"),  # it had the climb angle of a curve on a sphere
         (600111, "spline"),  # the steepest point of a curve that almost turns back lay between the eight samples
         (600036, "wing"),  # where two arcs overlap, the piece back from one to the next counted as climbing distance
+        (5001, "frames"),  # a leg above home was judged as if it began at its altitude, after one above ground
+        (5003, "frames"),  # so was a return, and a circle above ground was judged as level
         (1000092, "wing"),  # where two arcs overlap on a leg of 0.86 m, both counted as climbing distance
     ],
 )

@@ -165,7 +165,8 @@ def test_a_plans_fence_that_is_not_read_is_told(fence: Any, words: str) -> None:
 
 @pytest.mark.parametrize(
     ("firmware", "kind", "named"),
-    [(12, 1, "fixed wing"), (12, 20, "VTOL"), (12, 10, "rover"), (12, "wing", "wing"), (12, 2, ""), (12, None, ""), (3, 1, ""),
+    [(12, 1, "fixed wing"), (12, 20, "VTOL"), (12, 10, "rover"), (12, "wing", "wing"), (12, 2, ""), (12, None, ""),
+     (3, 1, ""),
      (3, 20, "")],
 )  # fmt: skip
 def test_a_plan_for_a_kind_of_vehicle_that_is_flown_otherwise_is_not_judged(

@@ -28,13 +28,13 @@ import numpy as np
 
 from gcsplan.arrays import Floats
 from gcsplan.check.fixed_wing.ends import climbed
-from gcsplan.check.motion.circles import circle_growth, tracking_m, true_m_s
+from gcsplan.check.motion.circles import bank_of_deg, circle_growth, tracking_m, true_m_s
 from gcsplan.check.motion.stretch import SAME_PLACE_M, Flight, Place, Stretch, flat_m
 from gcsplan.check.motion.turn_parameters import DEFAULTS, Tuning
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
 from gcsplan.notes.note import Note
-from gcsplan.vehicle import GRAVITY_M_S2, Autopilot, Vehicle
+from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.geodesy.frame import Frame
 
 __all__ = ["SAG_M", "bend", "tangent_m"]
@@ -85,7 +85,7 @@ def bend(flight: Flight, mission: Mission, vehicle: Vehicle, frame: Frame, tunin
         flight.not_judged.append(Note("l1_period_out_of_range", period_s=period_s, least_s=least_s, most_s=most_s))
         return
     fastest = max((s.speed_m_s for s in flight.stretches), default=0.0) + vehicle.wind_m_s
-    bank_deg = math.degrees(math.atan(fastest**2 / (GRAVITY_M_S2 * radius)))
+    bank_deg = bank_of_deg(radius, fastest)
     if bank_deg > MOST_BANK_DEG:
         flight.not_judged.append(
             Note("arcs_too_banked", radius_m=radius, speed_m_s=fastest, bank_deg=bank_deg, most_deg=MOST_BANK_DEG)

@@ -32,12 +32,12 @@ from gcsplan.check.fixed_wing.ends import REACHED_M, circle_up, climb_out, glide
 from gcsplan.check.flight.arc_waypoint import fly_arc
 from gcsplan.check.flight.route import fly_all
 from gcsplan.check.flight.times import DAY_S
-from gcsplan.check.motion.circles import PLANE_LOITER_RADIUS_M, circle_reach_m, circle_widened
+from gcsplan.check.motion.circles import PLANE_LOITER_RADIUS_M, circle_reach_m, circle_too_banked, circle_widened
 from gcsplan.check.motion.commands import flown_otherwise, moves_nothing, why_lost
 from gcsplan.check.motion.flight_state import TERRAIN_ERROR_M, Aboard, reads_ground
 from gcsplan.check.motion.return_rules import RETURN_RULES, returned
 from gcsplan.check.motion.spline import NO_DIRECTION, chords, slowed, towards
-from gcsplan.check.motion.stopping import about_turn_m
+from gcsplan.check.motion.stopping import about_turn_m, circle_home_m
 from gcsplan.check.motion.stretch import Flight, Place, StretchKind, flat_m, place_on
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
@@ -292,12 +292,17 @@ class _Pilot(Aboard):
         plane = self.autopilot is Autopilot.ARDUPLANE
         radius_m = abs(radius_m) if math.isfinite(radius_m) else 0.0
         if radius_m > (1.0 if plane else 0.0):
-            return max(radius_m, self.vehicle.turn_radius_m)
-        parameter, default_m = (
-            ("WP_LOITER_RAD", PLANE_LOITER_RADIUS_M) if plane else ("CIRCLE_RADIUS", COPTER_CIRCLE_RADIUS_M)
-        )
-        self.note(Note("circle_by_default", seq, parameter=parameter, radius_m=default_m))
-        return max(default_m, self.circle_m, self.vehicle.turn_radius_m)
+            radius_m = max(radius_m, self.vehicle.turn_radius_m)
+        else:
+            parameter, default_m = (
+                ("WP_LOITER_RAD", PLANE_LOITER_RADIUS_M) if plane else ("CIRCLE_RADIUS", COPTER_CIRCLE_RADIUS_M)
+            )
+            self.note(Note("circle_by_default", seq, parameter=parameter, radius_m=default_m))
+            radius_m = max(default_m, self.circle_m, self.vehicle.turn_radius_m)
+        tight = circle_too_banked(seq, radius_m, self.pace.speed_m_s) if plane else None
+        if tight is not None and tight not in self.flight.not_judged:
+            self.flight.not_judged.append(tight)
+        return radius_m
 
     def _circles_m(self, radius_m: float, amsl_m: float) -> float:
         """How far from its middle a plane's circle reaches."""
@@ -375,13 +380,15 @@ class _Pilot(Aboard):
             self.flight.not_judged.append(why)
             self.landed = True
             return
-        if RETURN_RULES[self.autopilot].climbs_first and self.at[2] + self.off_m <= self.home[2] + self.rtl_rel_home_m:
+        rule, level_m = RETURN_RULES[self.autopilot], self.home[2] + self.rtl_rel_home_m
+        if rule.climbs_first and self.at[2] + self.off_m <= level_m:
             self.off_m = 0.0  # it climbs to the same altitude from wherever it is
         self.pace = replace(self.pace, speed_m_s=self.vehicle.return_speed_m_s or self.pace.speed_m_s)
         flown, instead = returned(
             lambda start, end, **more: self.stretch(seq, "rtl", start, end, more),
-            RETURN_RULES[self.autopilot], self.at, self.home, self.home[2] + self.rtl_rel_home_m,
+            rule, self.at, self.home, level_m,
             about_m=about_turn_m(self.vehicle, self.pace.speed_m_s, self.at[2], flat_m(self.at, self.home)),
+            circle_m=circle_home_m(rule.circle_m(level_m), self.vehicle, level_m),
             waits_s=self.vehicle.return_waits_s,
         )  # fmt: skip
         self.flight.stretches += flown

@@ -45,6 +45,24 @@ def circle_widened(seq: int, radius_m: float, amsl_m: float) -> Note | None:
     return Note("circle_widened", seq, radius_m=radius_m, amsl_m=amsl_m, flown_m=flown_m, judged_m=most_m)
 
 
+def bank_of_deg(radius_m: float, speed_m_s: float) -> float:
+    """The bank of a turn at a speed, degrees."""
+    return math.degrees(math.atan(speed_m_s**2 / (GRAVITY_M_S2 * radius_m)))
+
+
+def circle_too_banked(seq: int, radius_m: float, speed_m_s: float) -> Note | None:
+    """Why a circle is flown wider than it is given, at an indicated airspeed; None if it is not.
+
+    Thin air widens a circle by as much as it makes its bank larger, so the bank is the same at every altitude.
+    """
+    bank_deg = bank_of_deg(radius_m, speed_m_s)
+    if bank_deg <= MOST_BANK_DEG:
+        return None
+    return Note(
+        "circle_too_banked", seq, radius_m=radius_m, speed_m_s=speed_m_s, bank_deg=bank_deg, most_deg=MOST_BANK_DEG
+    )
+
+
 LATE_S, LATE_PER_SINE = 0.72, 3.0
 """Seconds of flight by which a turn lies outside its arc, and how fast that grows with the sine of a small turn."""
 

@@ -123,12 +123,13 @@ def returned(
     return_amsl_m: float,
     *,
     about_m: float,
+    circle_m: float = 0.0,
     waits_s: float = 0.0,
 ) -> tuple[list[Stretch], list[Stretch]]:
     """The return from ``at`` to ``home`` (a place on the ground); and what some versions fly in place of parts of it.
 
     ``waits_s``: the seconds over home before it descends. ``about_m``: see `stopping.about_turn_m`; a plane flies home
-    from anywhere that far from ``at``.
+    from anywhere that far from ``at``, and circles over home within ``circle_m``, see `stopping.circle_home_m`.
     """
     lat, lon, ground = home
     level = rule.level_amsl_m(return_amsl_m, at[2])
@@ -137,7 +138,7 @@ def returned(
         aside = _band(flies, at, home, at[2], level)
         return [
             aside,
-            flies(over, over, reach_m=rule.circle_m(level), hold_s=math.inf),
+            flies(over, over, reach_m=circle_m, hold_s=math.inf),
         ], [
             flies(at, at, reach_m=about_m),
             *(_part(aside, a, b, (1.0 - a) * about_m) for a, b in pairwise(ASIDE_PARTS)),

@@ -88,7 +88,7 @@ def test_an_arduplane_return_is_judged_over_the_whole_band_of_altitudes() -> Non
     )  # fmt: skip
     back, circle = flight.stretches[-2:]
     assert (back.start[2], back.end[2], back.band_m) == (400, 400, 20)
-    assert 60 < circle.reach_m < 75  # the circle grows with altitude
+    assert 70 < circle.reach_m < 80  # the circle grows with altitude, and is flown wide
     assert math.isinf(circle.hold_s)
 
 
@@ -182,6 +182,17 @@ def test_a_circle_above_ground_rises_and_falls_with_it() -> None:
         assert circle.reach_m > 0.0
         assert circle.band_m == pytest.approx(30.0 + 0.1 * circle.reach_m)
         assert unknown(follow(mission, vehicle(pilot), *grounds)) == [cmd.LOITER_TURNS]
+
+
+@pytest.mark.parametrize(
+    ("radius_m", "speed_m_s", "judged"), [(45.0, 20.0, True), (40.0, 20.0, False), (0.0, 30.0, False)]
+)
+def test_a_circle_too_tight_for_the_planes_bank_is_not_judged(radius_m: float, speed_m_s: float, judged: bool) -> None:
+    """45° at 20 m/s are a circle of 40.8 m; ArduPlane's own has 60 m."""
+    speed = MissionItem(cmd.DO_CHANGE_SPEED, m.NO_POSITION, (0.0, speed_m_s, -1.0, 0.0))
+    ring = MissionItem(cmd.LOITER_TURNS, m.RELATIVE, (1, 0, radius_m, 0), m.degrees_e7(36.601), m.degrees_e7(-84.3), 80)
+    flight = fly(VTOL_TAKEOFF, speed, ring, autopilot=Autopilot.ARDUPLANE)
+    assert ("circle_too_banked" in codes(flight.not_judged)) is not judged
 
 
 def test_a_landing_elsewhere_is_judged_both_level_and_along_the_ground() -> None:

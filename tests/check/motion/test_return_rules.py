@@ -72,14 +72,18 @@ def test_the_altitudes_of_the_way_home(
 def test_a_copter_ends_on_the_ground_and_a_plane_on_a_circle() -> None:
     down, _ = returned(flies, RETURN_RULES[COPTER], away(500.0, 320.0), HOME, 360.0, about_m=8.0)
     assert down[-1].end == HOME
-    (_, circle), (about, *aside) = returned(flies, RETURN_RULES[PLANE], away(500.0, 320.0), HOME, 360.0, about_m=8.0)
+    (_, circle), (about, *aside) = returned(
+        flies, RETURN_RULES[PLANE], away(500.0, 320.0), HOME, 360.0, about_m=8.0, circle_m=70.0
+    )
     assert about.reach_m == 8.0
     assert [(s.reach_m, s.band_m) for s in aside] == [(w, 20.0) for w in (8.0, 6.0, 4.0, 2.0)]
     assert aside[0].start == (*away(500.0, 320.0)[:2], 340.0)
     assert aside[-1].end == (*HOME[:2], 340.0)
     for one, two in pairwise(aside):
         assert one.end == two.start
-    assert circle.reach_m == pytest.approx(60.0 * 1.1 / (1.0 - 2.25577e-5 * 360.0) ** 4.2559)
+    assert circle.reach_m == 70.0
+    grown_m = RETURN_RULES[PLANE].circle_m(360.0)
+    assert grown_m == pytest.approx(60.0 * 1.1 / (1.0 - 2.25577e-5 * 360.0) ** 4.2559)
     assert math.isinf(circle.hold_s)
     assert circle_growth(-50.0) == pytest.approx(1.1)
 
