@@ -105,19 +105,18 @@ class Aboard:
     def settled(self, item: MissionItem) -> None:
         """The vehicle is at the item: its altitude is the item's own, or as far off it as the ground that it read."""
         if reads_ground(item):
-            self.off_m = self.terrain_error_m
+            self.circles_over_ground(item, 0.0)
         elif not self.keeps_altitude(item):
             self.off_m = 0.0
 
     def circles_over_ground(self, item: MissionItem, reach_m: float) -> bool:
         """Count how far a circle around the present place follows the ground up and down; False: it is not known."""
-        if not reads_ground(item) or reach_m <= 0.0:
+        if not reads_ground(item):
             return True
-        change_m = self.read_change_m(*self.at[:2], reach_m) if self.read_change_m else math.nan
-        if math.isnan(change_m):
-            return False
-        self.off_m += change_m
-        return True
+        alone_m = 0.0 if reach_m == 0.0 else math.nan
+        change_m = self.read_change_m(*self.at[:2], reach_m) if self.read_change_m else alone_m
+        self.off_m = self.terrain_error_m + (0.0 if math.isnan(change_m) else change_m)
+        return not math.isnan(change_m)
 
     def has_place(self, item: MissionItem) -> bool:
         """Whether the item holds a place; latitude = longitude = 0 means "here"."""

@@ -55,11 +55,14 @@ class VehicleTerrain:
         return float(self.posts.amsl(lat_deg * 1e7, lon_deg * 1e7))
 
     def change_m(self, lat_deg: float, lon_deg: float, reach_m: float) -> float:
-        """How far the ground that it reads within ``reach_m`` of a place may be from the ground that it reads there, m.
+        """How far the ground that it reads within ``reach_m`` of a place may be from the one that `amsl` says, m.
 
-        Never less than it is, for all posts around count; NaN where one of them is unknown, or the reach too long.
+        Never less than it is, for all posts around count, and what sources differ; NaN where one of them is unknown, or
+        the reach too long. At 0 m it is `spread_at`.
         """
-        grid = self.posts.grid
+        grid, spread_m = self.posts.grid, float(self.spread_at(*self._frame.to_plane(lat_deg, lon_deg)[:, None])[0])
+        if reach_m == 0.0:
+            return spread_m
         if not reach_m <= MOST_POSTS_AROUND * grid.spacing_m:
             return math.nan
         part = reach_m / LEAST_DEGREE_M
@@ -74,7 +77,7 @@ class VehicleTerrain:
             )
             off_m = float(np.abs(self.posts.window(cell, north, east) - here).max())
             most = off_m if math.isnan(off_m) else max(most, off_m)  # a later tile keeps NaN: no number is above it
-        return most
+        return most + spread_m
 
     def ground_at(self, east_m: ArrayLike, north_m: ArrayLike) -> Floats:
         """The heights that it reads at points of the plane, m AMSL; NaN where unknown."""

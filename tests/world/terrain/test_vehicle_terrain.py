@@ -78,3 +78,9 @@ def test_around_unknown_posts_or_too_far_the_change_is_unknown() -> None:
     assert math.isnan(terrain(47.3, 8.3).change_m(47.3, 8.3, 5000.0))
     assert math.isnan(terrain(47.3, 8.3).change_m(47.3, 8.3, 200_000.0))
     assert math.isnan(terrain(47.3, 8.3).change_m(47.3, 8.3, math.nan))
+
+
+def test_around_a_place_what_sources_differ_counts_too() -> None:
+    alike, two = terrain(47.3, 8.3), terrain(47.3, 8.3, high=7.0)
+    assert (alike.change_m(47.3, 8.3, 0.0), two.change_m(47.3, 8.3, 0.0)) == (0.0, pytest.approx(7.0))
+    assert two.change_m(47.3, 8.3, 60.0) == pytest.approx(7.0 + alike.change_m(47.3, 8.3, 60.0), abs=1.0)
