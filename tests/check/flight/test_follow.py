@@ -176,12 +176,14 @@ def test_a_circle_above_ground_rises_and_falls_with_it() -> None:
     """A plane and a copter; where the ground around is not known, the circle is not judged."""
     ring = MissionItem(cmd.LOITER_TURNS, m.TERRAIN, (1, 0, 50, 0), m.degrees_e7(36.601), m.degrees_e7(-84.3), 80)
     for pilot, up in ((Autopilot.ARDUCOPTER, TAKEOFF), (Autopilot.ARDUPLANE, VTOL_TAKEOFF)):
-        mission, grounds = Mission(pilot, HOME, (up, ring)), [lambda lat, lon: GROUND_M] * 2
-        flight = follow(mission, vehicle(pilot), *grounds, lambda lat, lon, reach_m: 0.1 * reach_m)
+        mission, craft = Mission(pilot, HOME, (up, ring)), vehicle(pilot)
+        flight = follow(
+            mission, craft, lambda lat, lon: GROUND_M, read_change_m=lambda lat, lon, reach_m: 0.1 * reach_m
+        )  # fmt: skip
         circle = flight.stretches[-1]
         assert circle.reach_m > 0.0
         assert circle.band_m == pytest.approx(30.0 + 0.1 * circle.reach_m)
-        assert unknown(follow(mission, vehicle(pilot), *grounds)) == [cmd.LOITER_TURNS]
+        assert unknown(follow(mission, craft, lambda lat, lon: GROUND_M)) == [cmd.LOITER_TURNS]
 
 
 @pytest.mark.parametrize(
