@@ -141,6 +141,24 @@ class WindsAlong:
         air_m, seconds = (np.maximum(a, b).max(axis=1) for a, b in zip(*found, strict=True))
         return np.maximum.reduceat(air_m, self._first, axis=1), np.maximum.reduceat(seconds, self._first, axis=1)
 
+    def advance_per_air(self, cells: Floats, gust_m_s: float = 0.0) -> Floats:
+        """(P, 2) the least and the most metres over ground for a metre through the air, at the largest airspeed and
+        without regard to ``most_m_s``, with any wind of ``cells``; every wind may differ by ``gust_m_s``."""
+        along, across, bow = self._corners(cells)
+        beyond, at = bow + gust_m_s, self._expanded
+        least_air, most_air = at.least_air_m_s, at.most_air_m_s
+        t_low, t_high = along.min(axis=1) - beyond, along.max(axis=1) + beyond
+        n_low, n_high = across.min(axis=1) - beyond, across.max(axis=1) + beyond
+        n_most = np.maximum(np.abs(n_low), np.abs(n_high))
+        n_least = np.maximum(np.maximum(n_low, -n_high), 0.0)
+        straight_low, straight_high = (
+            np.sqrt(np.maximum(1.0 - (n / air) ** 2, 0.0)) for n, air in ((n_most, least_air), (n_least, most_air))
+        )
+        low = np.minimum(t_low / least_air, t_low / most_air) + straight_low
+        high = np.maximum(t_high / least_air, t_high / most_air) + straight_high
+        low, high = np.maximum(low.min(axis=0), 0.0), np.maximum(high.max(axis=0), 0.0)
+        return np.column_stack([np.minimum.reduceat(low, self._first), np.maximum.reduceat(high, self._first)])
+
     def strongest_m_s(self, cells: Floats) -> Floats:
         """(P,) the highest speed of all winds of ``cells``."""
         along, across, bow = self._corners(cells)

@@ -92,7 +92,8 @@ def craft(rng: random.Random, kind: str) -> tuple[Vehicle, oracle.Craft]:
         )
     one = replace(one, leg_jerk_m_s3=1.0, lean_angle_deg=lean if kind == "curves" else None)
     air = oracle.leaning_air_m_s(one.largest_lean_deg or lean, GROUND_M + 80.0)
-    return one, oracle.Craft(speed, air_m_s=air, climb_m_s=2.5, descent_m_s=1.5)
+    slopes = oracle.air_per_slope(one.largest_lean_deg or lean, GROUND_M + 80.0)
+    return one, oracle.Craft(speed, air_m_s=air, climb_m_s=2.5, descent_m_s=1.5, per_slope=slopes)
 
 
 def mission_of(rng: random.Random, vehicle: Vehicle) -> Mission:

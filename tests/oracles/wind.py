@@ -70,9 +70,10 @@ def _between(nodes: Sequence[float], x: float) -> tuple[int, float]:
 
 @dataclass(frozen=True)
 class Craft:
-    """``speed_m_s``: a copter's over ground, a wing's indicated. ``air_m_s``: a copter's highest airspeed.
+    """``speed_m_s``: a copter's over ground, a wing's indicated. ``air_m_s``: a copter's highest airspeed on the level.
 
-    ``radius_m``: of a wing's arcs; 0 is a copter. ``accel_m_s2``, ``corner_m_s2`` are a copter's.
+    ``per_slope``: that at the `SLOPES` through the air, as parts of it; empty: the same at each. ``radius_m``: of a
+    wing's arcs; 0 is a copter. ``accel_m_s2``, ``corner_m_s2`` are a copter's.
     """
 
     speed_m_s: float
@@ -82,14 +83,24 @@ class Craft:
     descent_m_s: float = 5.0
     accel_m_s2: float = 1.5
     corner_m_s2: float = 2.5
+    per_slope: tuple[float, ...] = ()
+
+    def air_at_m_s(self, slope: float) -> float:
+        """A copter's highest airspeed where it rises by ``slope`` through the air."""
+        if not self.per_slope:
+            return self.air_m_s
+        at = min(max((slope - SLOPES[0]) * 100.0, 0.0), len(SLOPES) - 1.001)
+        k = int(at)
+        return self.air_m_s * (self.per_slope[k] + (at - k) * (self.per_slope[k + 1] - self.per_slope[k]))
 
     @property
     def wing(self) -> bool:
         return self.radius_m > 0.0
 
 
-def leaning_air_m_s(lean_deg: float, amsl_m: float) -> float:
-    """The level airspeed at which ArduPilot's simulated quadrotor balances its drag (SIM_Frame.h)."""
+def leaning_air_m_s(lean_deg: float, amsl_m: float, slope: float = 0.0) -> float:
+    """The horizontal airspeed at which ArduPilot's simulated quadrotor balances its drag (SIM_Frame.h), while it rises
+    by ``slope`` metres per metre through the air."""
     weight = 3.0 * GRAVITY_M_S2
 
     def density(amsl: float) -> float:
@@ -102,15 +113,26 @@ def leaning_air_m_s(lean_deg: float, amsl_m: float) -> float:
     of_rotors = 0.5 * 15.08 * rotors(weight * math.sqrt(2.0), 593.0)
     area = (weight - of_rotors) / (0.5 * density(593.0) * 15.08**2)
     lean, low, high = math.radians(lean_deg), 0.0, 80.0
+    push = 0.5 * density(amsl_m) * area
     for _ in range(60):
         v = 0.5 * (low + high)
-        ahead, above = v * math.cos(lean), v * math.sin(lean)
-        push, thrust = 0.5 * density(amsl_m) * area, weight
+        ahead = v * (math.cos(lean) - slope * math.sin(lean))
+        above = v * (math.sin(lean) + slope * math.cos(lean))
+        thrust = weight
         for _ in range(20):
-            thrust = weight * math.cos(lean) + push * above * above + rotors(thrust, amsl_m) * above
-        slows = push * ahead * ahead + rotors(thrust, amsl_m) * ahead
+            thrust = weight * math.cos(lean) + push * above * abs(above) + rotors(max(thrust, 0.0), amsl_m) * above
+        slows = push * ahead * abs(ahead) + rotors(max(thrust, 0.0), amsl_m) * ahead
         low, high = (v, high) if slows < weight * math.sin(lean) else (low, v)
     return low
+
+
+SLOPES = tuple(k / 100.0 for k in range(-60, 61))
+
+
+def air_per_slope(lean_deg: float, amsl_m: float) -> tuple[float, ...]:
+    """Airspeeds at the `SLOPES` through the air, as parts of the one on the level."""
+    level = leaning_air_m_s(lean_deg, amsl_m)
+    return tuple(leaning_air_m_s(lean_deg, amsl_m, slope) / level for slope in SLOPES)
 
 
 def true_air_m_s(indicated_m_s: float, amsl_m: float) -> float:
@@ -270,10 +292,13 @@ def _along_m_s(p: Point, q: Point, whole: float, z: float, craft: Craft, wind: V
     if craft.wing:  # |v·d - w| = V, with the direction d in space
         square = true_air_m_s(craft.speed_m_s, z) ** 2 - across**2 - along**2 * (1.0 - flat**2)
         return min(along * flat + math.sqrt(square), by_rate) if square > 0.0 else 0.0
-    square = craft.air_m_s**2 - across**2
-    if square <= 0.0:
-        return 0.0
-    return min(min(craft.speed_m_s, along + math.sqrt(square)) / flat, by_rate)
+    air, most = craft.air_m_s, 0.0
+    for _ in range(8 if craft.per_slope and rise else 1):  # what it leans for depends on how fast it climbs
+        air = craft.air_at_m_s(rise / flat * most / air)
+        if air <= abs(across):
+            return 0.0
+        most = max(along + math.sqrt(air**2 - across**2), 0.0)
+    return min(min(craft.speed_m_s, most) / flat, by_rate)
 
 
 @dataclass

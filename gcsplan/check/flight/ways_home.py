@@ -70,7 +70,7 @@ class WaysHome:
     def _winds(self, speed_m_s: float) -> WindsAlong:
         angle = _RAY_RAD * np.arange(_RAYS)
         none, speed, one = np.zeros(_RAYS), np.full(_RAYS, speed_m_s), np.ones((_RAYS, 1))
-        least, most = air_m_s(self._vehicle, speed, none, np.full(_RAYS, self._amsl_m[0]))
+        least, most = air_m_s(self._vehicle, speed, np.zeros((_RAYS, 2)), np.full(_RAYS, self._amsl_m[0]))
         bound = np.full(_RAYS, math.inf) if self._vehicle.keeps_airspeed else speed
         ability = Ability(np.column_stack([np.cos(angle), np.sin(angle)]), none, least, most, bound)
         departs_s = self._wind.departs_s[0]

@@ -48,6 +48,7 @@ STRETCHES_BESIDE = 2
 PIECE_M, MOST_PIECES = 5.0, 24
 """A leg through a wind that depends on the height is cut into pieces that rise by at most this, at most so many."""
 _TRIED_STEPS = 12
+_SLOPE_ROUNDS = 4
 _LEAST_WAIT_S = 1e-3
 _TIMED_CELLS = 16
 _NO_RUN_M = 1e-6
@@ -79,11 +80,11 @@ class Costs:
     wind_m_s: Floats
 
 
-def air_m_s(vehicle: Vehicle, speed_m_s: Floats, slope: Floats, amsl_m: Floats) -> tuple[Floats, Floats]:
-    """(P,) the least and the most that a vehicle's airspeed is bounded by, on parts that rise by ``slope`` (P,).
+def air_m_s(vehicle: Vehicle, speed_m_s: Floats, slopes: Floats, amsl_m: Floats) -> tuple[Floats, Floats]:
+    """(P,) the least and the most that a vehicle's airspeed is bounded by, where its way through the air rises by a
+    slope between two, ``slopes`` (P, 2).
 
-    A fixed wing keeps its true airspeed. Others lean: level or along the slope, whichever is slower or faster, for the
-    slope through the air lies between.
+    A fixed wing keeps its true airspeed. Others lean: at one of both slopes they are slowest, at the other fastest.
     """
     if vehicle.keeps_airspeed:
         true = speed_m_s * true_per_indicated(amsl_m)
@@ -91,10 +92,9 @@ def air_m_s(vehicle: Vehicle, speed_m_s: Floats, slope: Floats, amsl_m: Floats) 
     if vehicle.largest_lean_deg is None:
         most = np.full(len(amsl_m), AIRSPEED_SPARE * vehicle.speed_max_m_s)
         return most, most
-    slant = np.arctan(slope)
-    level, along = (leaning_m_s(vehicle.largest_lean_deg, angle, amsl_m) for angle in (np.zeros_like(slant), slant))
-    along = along * np.cos(slant)
-    return np.minimum(level, along), np.maximum(level, along)
+    slant = np.arctan(slopes)
+    each = leaning_m_s(vehicle.largest_lean_deg, slant, amsl_m[:, None]) * np.cos(slant)
+    return each.min(axis=1), each.max(axis=1)
 
 
 def gust_length_m(agl_m: float) -> float:
@@ -117,7 +117,7 @@ class FlightInWind:
         self.stretches, self.times, self.vehicle, self.flies_in = stretches, times, vehicle, wind
         self.wind, self._departs_s = wind.declared, wind.departs_s
         self._parts, self._cuts = _pieces(times.parts, wind.declared)
-        self._ability, self._run_m = _ability(vehicle, times.parts, self._cuts)
+        self._ability, self._run_m, self._rise = _ability(vehicle, self._parts)
         self._agl_m, parts = _known(agl_m), self._parts
         self._piece_agl_m = self._agl_m[parts.stretch]
         if agl_of is not None and self.wind.heights == "agl" and (self._cuts > 1).any():
@@ -237,8 +237,9 @@ class FlightInWind:
         on_path = np.array([s.on_path for s in self.stretches])[self._parts.stretch] & (self._run_m > _NO_RUN_M)
         if self.vehicle.keeps_airspeed or not on_path.any():
             return math.inf
-        free = replace(self._ability, most_m_s=np.full(len(self._run_m), math.inf))
-        slow = slowest_m_s(replace(self._witnessing(self._any_hour), ability=free), self.wind.gusts_add_m_s)
+        along = self._witnessing(self._any_hour)
+        free = replace(along.ability, most_m_s=np.full(len(self._run_m), math.inf))
+        slow = slowest_m_s(replace(along, ability=free), self.wind.gusts_add_m_s)
         return float((slow / self._ability.most_m_s)[on_path].min())
 
     def _witnessing(self, hours_s: Floats) -> WindsAlong:
@@ -283,7 +284,7 @@ class FlightInWind:
             np.array([np.bincount(stretch, weights=w, minlength=count) for w in self._run_m * np.maximum(air, 1.0)])
         )
         fastest = np.zeros(count)
-        np.maximum.at(fastest, stretch, self._ability.most_air_m_s)
+        np.maximum.at(fastest, stretch, along.ability.most_air_m_s)
         wind_m_s = self._places(self.wind).strongest_m_s(cells)
         # Where it speeds up, brakes and turns, it is slower than the wind allows: the wind blows past for longer.
         even = [np.bincount(stretch, weights=self._run_m / g, minlength=count) for g in (slow, self._ability.most_m_s)]
@@ -317,7 +318,7 @@ class FlightInWind:
         for i, s in enumerate(self.stretches):
             if s.turns and hold[i] > 0.0:
                 amsl_m, speed = np.array([s.end[2]]), np.array([s.speed_m_s])
-                bounds = air_m_s(self.vehicle, speed, np.zeros(1), amsl_m)
+                bounds = air_m_s(self.vehicle, speed, np.zeros((1, 2)), amsl_m)
                 own = math.inf if self.vehicle.keeps_airspeed else s.speed_m_s
                 least[i] *= circle_ratio(slowest_m_s, float(bounds[1][0]), own)
                 most[i] *= circle_ratio(self.wind.most_m_s, float(bounds[0][0]), own)
@@ -426,7 +427,7 @@ class FlightInWind:
         cells, sigma = cover(self.wind), add_m_s / GUST_SIGMAS
         slow = along.speeds_m_s(cells)[0].min(axis=0)
         weak = along.speeds_m_s(cells, add_m_s)[0].min(axis=0) < self._ability.most_m_s
-        per_m_s, air = nothing.copy(), float(self._ability.least_air_m_s.min())
+        per_m_s, air = nothing.copy(), float(along.ability.least_air_m_s.min())
         np.maximum.at(per_m_s, self._parts.stretch, np.where(weak, 1.0 / slow, 0.0))
         lost_m_s = sigma / math.sqrt(2.0 * math.pi)
         if self.vehicle.keeps_airspeed:
@@ -478,7 +479,7 @@ class FlightInWind:
         amsl_m = np.sort([(s.start[2], s.end[2]) for s in self.stretches], axis=1)
         count = len(amsl_m)
         speed = np.array([s.speed_m_s for s in self.stretches])
-        least, most = air_m_s(self.vehicle, speed, np.zeros(count), amsl_m[:, 1])
+        least, most = air_m_s(self.vehicle, speed, np.zeros((count, 2)), amsl_m[:, 1])
         east = np.tile([1.0, 0.0], (count, 1))
         ability = Ability(east, np.zeros(count), least, most, np.full(count, math.inf))
         hours_s = np.tile([self._departs_s[0], math.inf], (count, 1))
@@ -486,9 +487,34 @@ class FlightInWind:
 
     def _along(self, wind: DeclaredWind, hours_s: Floats) -> WindsAlong:
         """The winds of a set along the parts, within hours (P, 2)."""
-        parts = self._parts
-        amsl_m = np.sort(np.column_stack([parts.start[:, 2], parts.end[:, 2]]), axis=1)
-        return winds_within(wind, self._ability, amsl_m, self._piece_agl_m, hours_s)
+        able = self._leaning if wind is self.wind else self._able(wind)
+        return winds_within(wind, able, self._amsl_m, self._piece_agl_m, hours_s)
+
+    @cached_property
+    def _amsl_m(self) -> Floats:
+        return np.sort(np.column_stack([self._parts.start[:, 2], self._parts.end[:, 2]]), axis=1)
+
+    @cached_property
+    def _leaning(self) -> Ability:
+        return self._able(self.wind)
+
+    def _able(self, wind: DeclaredWind) -> Ability:
+        """What the vehicle can do on the parts in the winds of a set, with gusts.
+
+        A multicopter that leans its most rises through the air by the slope of its leg times its speed over ground per
+        airspeed. Two at most, for it keeps its place in these winds; and each range of airspeeds gives one of slopes.
+        """
+        able, rise = self._ability, self._rise
+        if self.vehicle.largest_lean_deg is None or not rise.any():
+            return able
+        per_air = np.tile([0.0, 2.0], (len(rise), 1))
+        middle_m = self._amsl_m.mean(axis=1)
+        for _ in range(_SLOPE_ROUNDS):
+            least, most = air_m_s(self.vehicle, self._parts.speed_m_s, rise[:, None] * per_air, middle_m)
+            able = replace(able, least_air_m_s=least, most_air_m_s=most)
+            along = winds_within(wind, able, self._amsl_m, self._piece_agl_m, self._any_hour)
+            per_air = np.clip(along.advance_per_air(cover(wind), wind.gusts_add_m_s), per_air[:, :1], per_air[:, 1:])
+        return able
 
 
 def _known(agl_m: Floats) -> Floats:
@@ -509,16 +535,16 @@ def _pieces(parts: Parts, wind: DeclaredWind) -> tuple[Parts, Indices]:
     return Parts(start, end, parts.stretch[number], parts.speed_m_s[number]), cuts
 
 
-def _ability(vehicle: Vehicle, parts: Parts, cuts: Indices) -> tuple[Ability, Floats]:
-    """What the vehicle can do on the pieces of the parts, and their lengths over ground (P,)."""
+def _ability(vehicle: Vehicle, parts: Parts) -> tuple[Ability, Floats, Floats]:
+    """What the vehicle can do on parts in still air; their lengths over ground (P,), and their rise per metre (P,)."""
     d = parts.end - parts.start
     run = np.hypot(d[:, 0], d[:, 1])
     moves = run > _NO_RUN_M
     level = np.where(moves, run, 1.0)
     course = np.where(moves[:, None], d[:, :2] / level[:, None], 0.0)
     slope = np.where(moves, d[:, 2] / level, 0.0)
-    least, most = air_m_s(vehicle, parts.speed_m_s, slope, 0.5 * (parts.start[:, 2] + parts.end[:, 2]))
+    middle_m = 0.5 * (parts.start[:, 2] + parts.end[:, 2])
+    least, most = air_m_s(vehicle, parts.speed_m_s, np.column_stack([np.zeros_like(slope), slope]), middle_m)
     wing = vehicle.keeps_airspeed
     bound = np.full(len(run), math.inf) if wing else parts.speed_m_s
-    rows = course, slope if wing else np.zeros_like(slope), least, most, bound
-    return Ability(*(np.repeat(row, cuts, axis=0) for row in rows)), np.repeat(run / cuts, cuts)
+    return Ability(course, slope if wing else np.zeros_like(slope), least, most, bound), run, slope

@@ -18,7 +18,6 @@ from gcsplan.check.flight.winds import (
     COUPLED,
     COUPLED_SMOOTH,
     UNEVEN_S,
-    air_m_s,
     gust_length_m,
 )
 from gcsplan.check.judge import judge
@@ -29,6 +28,7 @@ from gcsplan.wind.declared import DeclaredWind, FlightWind
 from gcsplan.wind.window import TimeWindow
 from gcsplan.world.geodesy.atmosphere import true_per_indicated
 from tests.check.test_judge import ideal, mission_over
+from tests.oracles import wind as oracle
 from tests.support.wings import through, wing
 from tests.support.worlds import vehicle, world
 
@@ -183,6 +183,15 @@ def test_a_profile_over_height_counts_at_the_height_that_is_flown() -> None:
     assert window_of(aloft)[1] == pytest.approx(window_of(flown(blows((6, 6), (90, 90))))[1], rel=1e-4)
 
 
+def leaned_m_s(along_m_s: float, slope: float, most_m_s: float, lean_deg: float, amsl_m: float) -> float:
+    """The speed over ground of a copter that leans its most on a leg with this slope, by the oracle's drag."""
+    air = over_ground = most_m_s
+    for _ in range(5):
+        air = oracle.leaning_air_m_s(lean_deg, amsl_m, slope * over_ground / air)
+        over_ground = min(along_m_s + air, most_m_s)
+    return over_ground
+
+
 @pytest.mark.parametrize("heights", ["amsl", "agl"])
 def test_a_long_climb_through_a_profile_counts_the_wind_at_each_height(heights: str) -> None:
     craft, ground_m = replace(ideal(), speed_max_m_s=12.0, lean_angle_deg=40.0), 300.0
@@ -190,14 +199,24 @@ def test_a_long_climb_through_a_profile_counts_the_wind_at_each_height(heights: 
     aloft = blows(((1, 1), (8, 8)), ((90, 90), (90, 90)), heights_m=nodes_m, heights=heights)
     verdict = flown(aloft, craft, [[0.0, 0, 360], [4000, 0, 480]])
     (_, begins_s), (earliest_s, latest_s) = (verdict.leg_windows_s() or ())[0], window_of(verdict)
-    amsl_m = np.linspace(360.0, 480.0, 4001)
-    slope = np.full(4001, 0.03)
-    bounds = [np.minimum(air - np.interp(amsl_m, [360.0, 480.0], [1.0, 8.0]), 12.0)
-              for air in air_m_s(craft, np.full(4001, 12.0), slope, np.full(4001, 420.0))]  # fmt: skip
-    least_s, most_s = (4000.0 * float((1.0 / g).mean()) for g in reversed(bounds))
-    assert earliest_s - begins_s <= least_s * 1.001
-    assert latest_s - begins_s >= most_s * 0.999
-    assert latest_s - earliest_s <= 0.07 * most_s  # the lean is known within half of this
+    heights_m = np.linspace(367.5, 472.5, 8)
+    head_m_s = np.interp(heights_m, [360.0, 480.0], [1.0, 8.0])
+    seconds = [4000.0 / leaned_m_s(-w, 0.03, 12.0, 40.0, z) for w, z in zip(head_m_s, heights_m, strict=True)]
+    flown_s = float(np.mean(seconds))
+    assert earliest_s - begins_s <= flown_s * 1.001
+    assert latest_s - begins_s >= flown_s * 0.999
+    assert latest_s - earliest_s <= 0.04 * flown_s
+
+
+@pytest.mark.parametrize(("from_deg", "rise_m"), [(90, 80), (270, 80), (90, -80), (270, -80)])
+def test_a_largest_lean_counts_by_the_slope_through_the_air(from_deg: int, rise_m: int) -> None:
+    """Against the wind a copter climbs less steeply through the air than over ground, with it more steeply."""
+    craft = replace(ideal(), speed_max_m_s=20.0, lean_angle_deg=30.0, climb_m_s=8.0, descent_m_s=8.0)
+    verdict = flown(blows((6, 6), (from_deg, from_deg)), craft, [[0.0, 0, 460], [1000, 0, 460 + rise_m]])
+    (_, begins_s), (earliest_s, latest_s) = (verdict.leg_windows_s() or ())[0], window_of(verdict)
+    along_m_s = 6.0 if from_deg == 270 else -6.0
+    flown_s = 1000.0 / leaned_m_s(along_m_s, rise_m / 1000.0, 20.0, 30.0, 460.0 + 0.5 * rise_m)
+    assert (earliest_s - begins_s, latest_s - begins_s) == pytest.approx((flown_s, flown_s), rel=2e-3)
 
 
 @pytest.mark.slow
