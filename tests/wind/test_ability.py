@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -77,6 +78,10 @@ def test_bounds_of_a_cell_hold_every_wind_in_it(course, slope, most, low, more, 
         assert seconds >= 1.0 / g - 1e-9
         if most < math.inf or slope == 0.0:
             assert air_m >= math.hypot(*(g * able.course[0] - wind)) / g - 1e-6
+    if slope == 0.0 or most < math.inf:
+        free = replace(winds, ability=on_one_part(course, 0.0, 16.0))
+        least, most_air = free.advance_per_air(cell[None])[0]
+        assert least - 1e-9 <= flown_m_s(free.ability, wind) / 16.0 <= most_air + 1e-9
 
 
 def test_the_bounds_of_a_single_wind_are_its_speed():
