@@ -71,6 +71,9 @@ DAMAGED = (
 )  # fmt: skip
 """The errors that the library raises for damaged archives."""
 
+ENCRYPTED = 0x1
+"""The flag of a member of a zip archive that has a password."""
+
 
 def unpack(
     path: Path, data: bytes, kinds: Sequence[str], most_bytes: int, beside: Sequence[str] = ()
@@ -96,6 +99,9 @@ def unpack(
             companions = [n for n in names if n.with_suffix("") == main.with_suffix("") and n.suffix.lower() in beside]
             unpacked: dict[str, bytes] = {}
             for name in dict.fromkeys([main, *companions]):
+                if members[name].flag_bits & ENCRYPTED:
+                    words = "is encrypted; unpack it with its password, and name the file in it"
+                    raise InputError(words, where=f"{path}: {name}")
                 with archive.open(members[name]) as member:
                     unpacked[name.suffix.lower()] = member.read(most_bytes + 1)
                 # The archive's own sizes may be wrong, so the bytes themselves are counted.

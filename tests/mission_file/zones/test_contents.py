@@ -61,6 +61,12 @@ def archive(**members: bytes) -> bytes:
     return data.getvalue()
 
 
+def encrypted(data: bytes) -> bytes:
+    """An archive whose first member says that it has a password."""
+    flags = data.index(b"PK\x01\x02") + 8
+    return data[:flags] + bytes([data[flags] | 1]) + data[flags + 1 :]
+
+
 def test_of_an_archive_the_one_file_of_its_kind_and_those_beside_it_are_unpacked() -> None:
     data = archive(in__a_shp=b"1", in__a_dbf=b"2", in__b_dbf=b"3", readme_txt=b"4")
     assert unpack(Path("z.zip"), data, (".shp",), 100, (".dbf", ".prj")) == {".shp": b"1", ".dbf": b"2"}
@@ -71,8 +77,9 @@ def test_of_an_archive_the_one_file_of_its_kind_and_those_beside_it_are_unpacked
     [(archive(a_kml=b"1", b_kml=b"2"), "must hold one .kml file, given a.kml, b.kml; unpack it"),
      (archive(a_txt=b"1"), "given a.txt"), (archive(), "given nothing"),
      (archive(a_kml=bytes(1000)), "unpacks to more than 100 bytes"), (archive(a_kml=b"1")[:-9], "not a sound zip"),
-     (b"PK\x03\x04 and no more", "not a sound zip")],
-    ids=["two", "another kind", "empty", "large", "cut off", "a beginning"],
+     (b"PK\x03\x04 and no more", "not a sound zip"),
+     (encrypted(archive(a_kml=b"1")), "z.kmz: a.kml: is encrypted; unpack it with its password")],
+    ids=["two", "another kind", "empty", "large", "cut off", "a beginning", "with a password"],
 )  # fmt: skip
 def test_an_archive_that_is_not_one_file_of_its_size_is_refused(data: bytes, words: str) -> None:
     with pytest.raises(InputError, match=words):
