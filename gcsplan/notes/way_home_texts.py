@@ -11,6 +11,7 @@ WAY_HOME_TEXTS = {
     "return_safe": "{path}; safe return from all of it",
     "no_return_from_point": "{path}; no safe return from a point of it",
     "no_return_from_part": "{path}; no safe return from {no_return_m:reach} of it",
+    "verdict_of_some": "{count} {count:vehicle|vehicles}: {verdict}",
     "why_not_judged": "{verdict}: {why}",
     "no_return_at_item": "{verdict}, at item {seq}",
     "no_return_for_battery": "{verdict} (battery)",

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,10 +15,10 @@ from gcsplan.app.plan.way_home import is_required, lets_fly
 from gcsplan.app.session import BetterPath
 from gcsplan.arrays import Floats
 from gcsplan.check.returns.verdict import WayHome
-from gcsplan.check.returns.words import verdict_words
+from gcsplan.check.returns.words import listed, verdict_words
 from gcsplan.check.verdict import LegFigures, Verdict
 from gcsplan.errors import GcsplanError, InputError, NoMission
-from gcsplan.notes.note import Wording
+from gcsplan.notes.note import Note, Wording
 from gcsplan.page.fleet.crew_changes import attempts
 from gcsplan.page.fleet.time_table import numbers_of, time_table
 from gcsplan.page.form import cure_changes
@@ -88,10 +89,27 @@ def _flies(v: VehiclePlan, plan: Plan, home: WayHome | None) -> bool | None:
     return v.verdict.safe
 
 
+class _Returns(NamedTuple):
+    """The ways home of several vehicles with the same verdict, and the metres without a safe return of all."""
+
+    safe: bool | None
+    no_return_m: float
+
+
 def _headline(plan: Plan, homes: Mapping[str, WayHome], wording: Wording) -> str:
-    """The verdict of the only vehicle, or of each."""
-    words = [(v.name, verdict_words(v.verdict.safe, homes.get(v.name)).text(wording)) for v in plan.vehicles]
-    return words[0][1] if len(words) == 1 else "; ".join(f"{name}: {text}" for name, text in words[:MOST_ON_PAGE])
+    """The verdict of the only vehicle, or of each; of many how many have the same, the worst first."""
+    if len(plan.vehicles) <= MOST_PROFILES:
+        words = [(v.name, verdict_words(v.verdict.safe, homes.get(v.name)).text(wording)) for v in plan.vehicles]
+        return words[0][1] if len(words) == 1 else "; ".join(f"{name}: {text}" for name, text in words)
+    found = defaultdict[tuple[bool | None, bool | None], list[float]](list)
+    for v in plan.vehicles:
+        home = homes.get(v.name)
+        found[v.verdict.safe, None if home is None else home.safe].append(0.0 if home is None else home.no_return_m)
+    some = sorted(found.items(), key=lambda one: [value is True for value in one[0]])
+    return listed(
+        Note("verdict_of_some", count=len(each_m), verdict=verdict_words(path, _Returns(home_safe, sum(each_m))))
+        for (path, home_safe), each_m in some
+    ).text(wording)
 
 
 def profile_answer(n: int, plan: Plan, vehicle: int) -> dict[str, Any] | None:

@@ -98,13 +98,15 @@ def test_an_error_names_the_key_without_the_file() -> None:
     assert (found["where"], found["message"]) == ("limits.min_agl_m", "limits.min_agl_m: must be\nname: must not")
 
 
-def test_of_many_vehicles_the_profile_of_the_chosen_one_alone_is_sent(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_of_many_vehicles_verdicts_are_counted_and_one_profile_is_sent(monkeypatch: pytest.MonkeyPatch) -> None:
     second = {**MISSION["vehicles"][0], "name": "uav2", "sysid": 2, "start": [46.5, 8.52], "goal": [46.51, 8.52]}
     planned = plan({**MISSION, "vehicles": [*MISSION["vehicles"], second]})
     both = answers.plan_answer(1, planned, {}, METRIC, 0.0, 1)["vehicles"]
     assert answers.profile_answer(2, planned, 0) is None  # it came with the plan
     monkeypatch.setattr("gcsplan.page.answers.MOST_PROFILES", 1)
-    found = answers.plan_answer(1, planned, {}, METRIC, 0.0, 1)["vehicles"]
+    whole = answers.plan_answer(1, planned, {}, METRIC, 0.0, 1)
+    assert whole["headline"] == "2 vehicles: path safe, return not judged"
+    found = whole["vehicles"]
     assert [v["profile"] for v in found] == [None, both[1]["profile"]]
     later = answers.profile_answer(2, planned, 0)
     assert later is not None

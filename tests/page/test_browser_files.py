@@ -13,6 +13,7 @@ pytest.importorskip("websockets", reason="the extra map is not installed")
 
 from gcsplan.app.fleet.pipeline import load_mission, plan
 from tests.page.browser_hand import IN_A_BROWSER, Hand
+from tests.page.steps.test_walk import sent
 from tests.page.talk import FLAT, eventually, serving
 from tests.support.browser import Browser
 
@@ -51,7 +52,7 @@ def opened(page: Browser, url: str, *, width: int = 1200, dark: bool = False) ->
     return hand
 
 
-def test_a_plan_through_a_hill_is_found_planned_anew_dragged_until_proved_and_saved(
+def test_a_plan_through_a_hill_is_found_dragged_until_proved_saved_sent_and_verified(
     page: Browser, tmp_path: Path
 ) -> None:
     file, folder = tmp_path / "somebody.plan", tmp_path / "missions"
@@ -84,6 +85,8 @@ def test_a_plan_through_a_hill_is_found_planned_anew_dragged_until_proved_and_sa
         hand.judged()
         hand.click("#save")
         assert eventually(lambda: "via:" in (folder / "hills.yaml").read_text())
+        hand.click("#fly-sim")
+        assert "is verified" in sent(hand)
         assert page.complaints() == []
         assert all(url.removeprefix("blob:").startswith(server.url.rpartition("/")[0][:20]) for url in page.requests())
     assert "# of all" in (folder / "hills.yaml").read_text()

@@ -73,12 +73,15 @@ class Dropped:
 
 def endings() -> dict[str, int]:
     """The endings of files that may be dropped, each with the most bytes of such a file."""
-    zones = (*ZONE_FILES, *OPENAIR_ZONES, *FENCE_ZONES, *ZONE_READERS.names())
     return {
-        **dict.fromkeys(zones, MAX_ZONE_BYTES),
+        **dict.fromkeys(_zone_endings(), MAX_ZONE_BYTES),
         **dict.fromkeys(VEHICLE_FILES, MAX_FILE_BYTES),
         **dict.fromkeys(GROUND_ENDINGS, MOST_GROUND_BYTES),
     }
+
+
+def _zone_endings() -> tuple[str, ...]:
+    return (*ZONE_FILES, *OPENAIR_ZONES, *FENCE_ZONES, *ZONE_READERS.names())
 
 
 def ending_of(name: str) -> str:
@@ -108,7 +111,10 @@ def most_bytes(name: str) -> int:
     other = {
         **dict.fromkeys(MISSION_FILES, "this is a mission file: open it with gcsplan map, or paste its text as YAML"),
         **dict.fromkeys(LOG_FILES, "this is a flight log: gcsplan fit-energy reads it"),
-    }.get(ending, f"files that end so are not read; drop {', '.join(endings())}")  # fmt: skip
+    }.get(ending)  # fmt: skip
+    kinds = (("a mission", VEHICLE_FILES), ("zones", _zone_endings()), ("terrain", TERRAIN_FILES))
+    read = "; ".join(f"{kind}: {', '.join(dict.fromkeys(of_kind))}" for kind, of_kind in kinds)
+    other = other or f"files that end so are not read. Drop {read}"
     raise InputError(other, where=name)
 
 

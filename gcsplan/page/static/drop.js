@@ -36,8 +36,9 @@ function dropped(event) {
   if (!carriesFile(event)) return;
   event.preventDefault();
   document.body.classList.remove('dropping');
-  const { files } = event.dataTransfer;
-  if (files.length) dropAll([...files]);
+  const { files, items } = event.dataTransfer, folder = [...items].map((item) => item.webkitGetAsEntry?.()).find((entry) => entry?.isDirectory);
+  if (folder) banner('file', `${folder.name} is a folder: drop the files that are in it.`, [], 'bad');
+  else if (files.length) dropAll([...files]);
 }
 
 // -- sending ----------------------------------------------------------------------------------------------------------

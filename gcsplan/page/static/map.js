@@ -23,7 +23,6 @@ export function startMap() {
   map.on('resize', () => tell('moved'));
   map.on('moveend', () => tell('rested'));
   for (const kind of ['dragstart', 'zoomstart']) map.on(kind, (event) => { touched = touched || Boolean(event.originalEvent); });
-  on('plan', () => { if (!touched) fit(); touched = true; }); // the first path may lead out of the picture
   map.on('error', () => {}); // a tile beside the terrain is absent, which is no error
   byId('zoom-in').addEventListener('click', () => map.zoomIn({ duration: 150 }));
   byId('zoom-out').addEventListener('click', () => map.zoomOut({ duration: 150 }));
@@ -52,6 +51,10 @@ export function showState() {
     fitted = whole;
     touched = false;
     fit();
+  });
+  on('plan', () => { // the first path may lead out of the picture, and the time line takes room of the map
+    if (!touched) { map.resize(); fit(); }
+    touched = true;
   });
 }
 

@@ -1,6 +1,7 @@
 // The result: the verdict, the gap that counts down, the figures; or why there is no mission, and what would do.
 import { button, byId, el } from './dom.js';
 import { known, on, tell } from './hub.js';
+import { MOST_SHOWN } from './fleet.js';
 import { holding } from './grips.js';
 import { change } from './link.js';
 import { goTo } from './map.js';
@@ -8,7 +9,9 @@ import { agePath, clearPath, drawNoHome, drawPath, markPlace } from './shapes.js
 
 const LOOK = { safe: ['safe', '✓'], violations: ['unsafe', '✕'], 'not judged': ['unjudged', '?'] };
 let box = null;
+let shown = -1; // the vehicle whose details are shown
 let current = null; // the plan that is shown as the verdict on the mission as it is now
+let found = new Set(); // the vehicles of the newest mission that have a path
 let before = []; // the answers of the newest mission: a change that is refused as a whole brings them back
 
 export function startResult() {
@@ -19,14 +22,17 @@ export function startResult() {
   on('plan', plan);
   on('home', home);
   on('refused', refused);
-  on('asked', () => { current = null; planning(); });
+  on('asked', () => { current = null; found = new Set(); planning(); });
   on('dragged', (changes) => { if (current) { agePath(moved(changes)); follows(); } });
   on('error', (message) => {
     if (message.code === 'bad_mission') nothing(message.message, 'The mission has a mistake');
     if (['bad_change', 'bad_file', 'bad_text', 'file_exists'].includes(message.code)) for (const answer of before) ({ plan, home, refused })[answer.type](answer);
   });
   on('connection', (now) => { if (now !== 'open') nothing('The result below may be old.', 'Not connected'); });
-  on('state', (state) => { for (const one of box.querySelectorAll('#rest > [data-vehicle]')) one.open = Number(one.dataset.vehicle) === state.vehicle; });
+  on('state', (state) => {
+    if (current && shown !== state.vehicle && current.vehicles.length > MOST_SHOWN) details(current);
+    for (const one of box.querySelectorAll('#rest > [data-vehicle]')) one.open = Number(one.dataset.vehicle) === state.vehicle;
+  });
   on('state', (state) => {
     if (state.stage === 'mission') { if (!known.plan) planning(); return; }
     clearPath();
@@ -81,8 +87,10 @@ function path(message) {
   if (message.live || holding()) {
     follows();
   } else {
-    showGap(message.gap_percent);
-    verdict('unjudged', '…', 'A path is found', 'The bound tightens; the mission is not judged yet.');
+    found.add(message.vehicle);
+    showGap(found.size > 1 ? null : message.gap_percent);
+    if (known.state.vehicles.length > 1) verdict('unjudged', '…', 'Planning', `${found.size === 1 ? 'One new path is' : `${found.size} new paths are`} found. Arrival times and separation follow when all are.`);
+    else verdict('unjudged', '…', 'A path is found', 'The bound tightens; the mission is not judged yet.');
   }
 }
 
@@ -97,11 +105,17 @@ function plan(message) {
   markPlace(null);
   judged(message, message.vehicles.map((v) => v.way_home), message.headline);
   showGap(null);
-  const rest = box.querySelector('#rest');
-  rest.classList.remove('old');
-  rest.replaceChildren(...message.vehicles.flatMap((v) => ofVehicle(v, message.vehicles.length > 1)),
-    ...[list('Left out', message.left_out.map((l) => `${l.name}: ${l.message}`), true), list('Notes on all', message.notes, false)].filter((p) => p));
+  details(message);
   tell('judged', message);
+}
+
+// Of more than a few vehicles, the chosen one and those that may not fly.
+function details(message) {
+  const rest = box.querySelector('#rest'), several = message.vehicles.length > 1, few = message.vehicles.length <= MOST_SHOWN;
+  shown = known.state.vehicle;
+  rest.classList.remove('old');
+  rest.replaceChildren(...message.vehicles.filter((v) => few || v.vehicle === shown || v.verdict !== 'safe').flatMap((v) => ofVehicle(v, several)),
+    ...[list('Left out', message.left_out.map((l) => `${l.name}: ${l.message}`), true), list('Notes on all', message.notes, false)].filter((p) => p));
 }
 
 // A mission is called safe with all its returns; before they are judged, or where one is unsafe, its path alone is.
@@ -139,6 +153,8 @@ function home(message) {
   judged(current, current.vehicles.map((v) => message.vehicles.find((h) => h.vehicle === v.vehicle)?.way_home), message.headline);
   drawNoHome(message.vehicles.flatMap((v) => (v.way_home ? v.way_home.unsafe : [])));
   for (const v of message.vehicles) {
+    const own = current.vehicles.find((o) => o.vehicle === v.vehicle);
+    if (own && !own.way_home) { own.way_home = v.way_home; own.figures.push(v.figure); } // for the time when it is chosen
     const row = box.querySelector(`[data-home="${v.vehicle}"]`);
     if (row && v.figure) row.replaceWith(figure(v.figure)); else row?.remove();
     if (v.way_home) byId(`home-${v.vehicle}`)?.replaceWith(homeWords(v.vehicle, v.way_home));

@@ -1,7 +1,7 @@
 // What lies over the ground: zones, the path, stretches without a way home. One SVG, moved as a whole with the map.
 import { el, svg } from './dom.js';
 import { known, on } from './hub.js';
-import { many, toneOf } from './fleet.js';
+import { MOST_SHOWN, many, toneOf } from './fleet.js';
 import { frame, local, metres, pixel, size, transformation } from './map.js';
 
 const d = (places, closed = false) => (places.length
@@ -21,7 +21,7 @@ export function startShapes() {
   on('moved', follow);
   on('rested', layNames);
   on('replayed', drawCrafts);
-  on('state', () => { for (const [vehicle, track] of tracks) dress(vehicle, track); });
+  on('state', () => { whole.classList.toggle('crowd', crowd()); for (const [vehicle, track] of tracks) dress(vehicle, track); });
   on('state', (state) => { drawZones(state.zones.features); layNames(); follow(); });
 }
 
@@ -141,12 +141,19 @@ function newTrack(vehicle) {
   return made;
 }
 
-const dress = (vehicle, track) => track.path.setAttribute('class', `track ${toneOf(vehicle)} ${track.how}${many() && known.state.vehicle === vehicle ? ' chosen' : ''}`);
+const chosen = (vehicle) => many() && known.state.vehicle === vehicle;
+
+function dress(vehicle, track) {
+  track.path.setAttribute('class', `track ${toneOf(vehicle)} ${track.how}${chosen(vehicle) ? ' chosen' : ''}`);
+  if (chosen(vehicle)) layers.path.append(track.path); // over the others
+}
+
+const crowd = () => known.state.vehicles.length > MOST_SHOWN;
 
 // Where the vehicles of the replay are; null for none.
 function drawCrafts(shown) {
-  flying = (shown ? shown.spots : []).map(({ vehicle, name, at }) => ({ at, made: el('i', { class: `craft ${toneOf(vehicle)}`, 'data-vehicle': vehicle }, many() ? el('b', {}, name) : null) }));
-  crafts.classList.toggle('many', flying.length > 100);
+  flying = (shown ? shown.spots : []).map(({ vehicle, name, at }) => ({ at, made: el('i', { class: `craft ${toneOf(vehicle)}`, 'data-vehicle': vehicle }, many() && (!crowd() || chosen(vehicle)) ? el('b', {}, name) : null) }));
+  crafts.classList.toggle('many', crowd());
   crafts.replaceChildren(...flying.map((craft) => craft.made));
   for (const craft of flying) put(craft.made, craft.at);
 }

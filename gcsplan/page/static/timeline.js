@@ -2,14 +2,14 @@
 // another row, for its turn; arrow keys do the same. The server plans the sequence on release.
 import { button, byId, el, refill } from './dom.js';
 import { known, on, worded } from './hub.js';
-import { choose, many, toneOf } from './fleet.js';
+import { MOST_SHOWN, choose, many, toneOf } from './fleet.js';
 import { change } from './link.js';
 import { goTo } from './map.js';
 import { showAt } from './replaybar.js';
 import { markPlace } from './shapes.js';
 
 const REST_MS = 700; // after this long without an arrow key an arrival counts as dropped
-const ROW_PX = 28;
+const ROW_PX = 28, ROLL_MS = 90;
 let box = null, whole = false, held = null, timer = 0, now = null;
 
 export function startTimeline() {
@@ -107,7 +107,7 @@ function wordsOf(r, i, rows) {
 }
 
 function axis(from, to, part) {
-  const most = Math.max(2, Math.min(8, Math.floor((box.clientWidth - 150) / 90)));
+  const most = Math.max(2, Math.min(8, Math.floor((byId('time').clientWidth - 180) / 90)));
   const step = [1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 14400].find((s) => s >= (to - from) / most) || 28800, ticks = [];
   for (let t = Math.ceil(from / step) * step; t <= to; t += step) {
     if (part(t) < 4 || part(t) > 96) continue; // its words would be cut
@@ -155,26 +155,35 @@ function turnTo(r, other) {
   held.changes = { 'arrival.order': names };
   const times = fleet().rows.map((row) => row.arrive_s), moved = [...fleet().rows].sort((a, b) => names.indexOf(a.name) - names.indexOf(b.name));
   held.rows = moved.map((row, i) => ({ ...row, arrive_s: times[i], window_s: null }));
-  held.words = `The order: ${names.join(', ')}`;
+  held.words = names.length > MOST_SHOWN ? `${r.name} arrives as number ${names.indexOf(r.name) + 1} of ${names.length}` : `The order: ${names.join(', ')}`;
 }
 
 function press(event, r, track) {
   if (event.button !== 0 || !movable(found_mode())) return;
   event.preventDefault();
-  const grip = event.currentTarget, at = [event.clientX, event.clientY], wide = track.getBoundingClientRect().width, rows = fleet().rows, mine = rows.findIndex((row) => row.name === r.name);
+  const grip = event.currentTarget, lanes = grip.closest('.lanes'), from = lanes.scrollTop, at = [event.clientX, event.clientY], wide = track.getBoundingClientRect().width, rows = fleet().rows, mine = rows.findIndex((row) => row.name === r.name);
   grip.focus({ preventScroll: true });
-  let going = false;
+  let going = false, last = null;
+  // While another turn is sought beyond the rows that are in sight, they come into it.
+  const roll = setInterval(() => {
+    const { top, bottom } = lanes.getBoundingClientRect(), y = last ? last.clientY : at[1];
+    if (!going || Math.abs(y - at[1]) < ROW_PX) return;
+    lanes.scrollTop += y > bottom - ROW_PX ? ROW_PX : y < top + ROW_PX ? -ROW_PX : 0;
+    move(last);
+  }, ROLL_MS);
   const move = (e) => {
+    last = e;
     const dx = e.clientX - at[0], dy = e.clientY - at[1];
     if (!going && Math.hypot(dx, dy) < 4) return;
     going = true;
     hold(r);
-    const row = Math.max(0, Math.min(rows.length - 1, mine + Math.round(dy / ROW_PX)));
+    const row = Math.max(0, Math.min(rows.length - 1, mine + Math.round((dy + lanes.scrollTop - from) / ROW_PX)));
     if (row !== mine && fleet().mode === 'sequence') turnTo(r, rows[row]);
     else shift(r, r.arrive_s + (dx / wide) * (held.span[1] - held.span[0]));
     preview();
   };
   const end = (e) => {
+    clearInterval(roll);
     for (const [kind, call] of heard) window.removeEventListener(kind, call, true);
     if (!going) { choose(r.vehicle); return; }
     if (e.type === 'pointerup') drop(); else back();

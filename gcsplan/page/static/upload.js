@@ -1,5 +1,6 @@
 // The dialogue of an upload: a look at the vehicles, the decision, the progress, what was read back.
 import { button, byId, el, refill } from './dom.js';
+import { MOST_SHOWN } from './fleet.js';
 import { known, on } from './hub.js';
 import { send } from './link.js';
 import { drawOnBoard } from './vehicles.js';
@@ -63,7 +64,17 @@ function looked(message) {
   const words = one ? `Send to ${message.vehicles[0].name}` : ok.length === message.vehicles.length ? `Send to ${ok.length} vehicles` : `Send to ${ok.length} of ${message.vehicles.length} vehicles`;
   const go = button(words, () => start(message), { id: 'upload-send', class: 'main', disabled: !message.ticket });
   show(one ? `Upload to ${message.vehicles[0].name}` : `Upload to ${message.vehicles.length} vehicles`,
-    [...message.vehicles.map(vehicle), release(message.release), ...notes(message.notes), el('p', { class: 'note' }, `The files go to ${message.folder}.`), permissions()], [go, again()], 'Not now');
+    [...each(message.vehicles, vehicle, (v) => Boolean(v.against) || !v.safe), release(message.release), ...notes(message.notes), el('p', { class: 'note' }, `The files go to ${message.folder}.`), permissions()], [go, again()], 'Not now');
+}
+
+// Of many vehicles each is folded to a line; those with something against them come first, and are open.
+function each(all, made, wrong) {
+  if (all.length <= MOST_SHOWN) return all.map(made);
+  return [...all].sort((a, b) => wrong(b) - wrong(a)).map((v) => {
+    const part = made(v), head = part.firstChild, off = (v.parameters || []).filter((p) => p.off).length;
+    head.remove();
+    return el('details', { class: 'vehicle', open: wrong(v) }, el('summary', {}, ...head.childNodes, off ? el('span', { class: 'warn' }, `, ${off === 1 ? '1 parameter' : `${off} parameters`} to set`) : null), ...part.childNodes);
+  });
 }
 
 function vehicle(v) {
@@ -128,7 +139,7 @@ function progress(message) {
 
 function ended(message) {
   const good = message.code === 0, all = message.vehicles;
-  const body = all.length ? all.map(result) : [el('p', { class: 'bad', role: 'alert' }, message.message)];
+  const body = all.length ? each(all, result, (v) => !v.verified) : [el('p', { class: 'bad', role: 'alert' }, message.message)];
   show(good ? (all.length === 1 ? `${all[0].name} is verified` : `${all.length} vehicles are verified`) : 'Not verified',
     [el('p', { class: `verdict ${good ? 'safe' : 'unsafe'}`, role: 'status', id: 'upload-end' }, good ? 'The mission was read back, is equal item for item, and passes the check.' : `Exit code ${message.code}: ${message.reason}`), ...body, release(message.release), ...notes(message.notes)],
     good ? [el('a', { class: 'button', href: 'report.html', target: '_blank' }, 'Briefing')] : [again()]);

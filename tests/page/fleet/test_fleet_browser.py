@@ -12,10 +12,12 @@ pytest.importorskip("starlette", reason="the extra map is not installed")
 pytest.importorskip("uvicorn", reason="the extra map is not installed")
 pytest.importorskip("websockets", reason="the extra map is not installed")
 
-from gcsplan.app.api import write
+from gcsplan.app.api import rehearse, write
 from gcsplan.app.session import Planner
 from gcsplan.cli.command_table import app
 from tests.page.browser_hand import IN_A_BROWSER, Hand
+from tests.page.fleet.test_fleet_server import VEHICLES, mission
+from tests.page.steps.test_walk import sent
 from tests.page.talk import FLAT, serving
 from tests.support.browser import Browser
 
@@ -60,7 +62,7 @@ def drag_arrival(hand: Hand, vehicle: int, dx: float, dy: float) -> None:
     planned(hand)
 
 
-def test_four_by_clicks_with_dragged_arrivals_have_the_command_lines_bytes(page: Browser, tmp_path: Path) -> None:
+def test_four_by_clicks_with_dragged_arrivals_are_saved_sent_verified_and_rehearsed(page: Browser, tmp_path: Path) -> None:
     with serving(None, tmp_path) as server:
         page.visit(server.url)
         hand = Hand(page)
@@ -87,6 +89,10 @@ def test_four_by_clicks_with_dragged_arrivals_have_the_command_lines_bytes(page:
         hand.click("#save")
         hand.click("#ask .main")
         hand.until("document.getElementById('save').textContent === 'Saved'")
+        hand.click("#fly-sim")
+        words = sent(hand)
+        assert "4 vehicles are verified" in words
+        hand.click("#upload-close")
         assert [words for words in page.complaints() if "404" not in words] == []  # tiles beside the terrain
         assert all(url.removeprefix("blob:").startswith(f"http://127.0.0.1:{server.port}/") for url in page.requests())
         shown = page.evaluate("[...document.querySelectorAll('#time .at')].map((e) => e.innerText)")
@@ -103,6 +109,7 @@ def test_four_by_clicks_with_dragged_arrivals_have_the_command_lines_bytes(page:
     write(own, tmp_path / "here")
     files = sorted(f.name for f in (tmp_path / "here").iterdir() if f.is_file())
     assert all((tmp_path / "here" / n).read_bytes() == (tmp_path / "there" / n).read_bytes() for n in files)
+    assert rehearse(own).safe is True
     assert own.fleet is not None
     found = [own.fleet.slot(name).arrive_s for name in arrival["order"]]
     seconds = [sum(60**k * int(part) for k, part in enumerate(reversed(words.split(":")))) for words in shown]
@@ -212,4 +219,37 @@ def test_time_line_and_space_fit_a_phone_and_a_dark_room(page: Browser, tmp_path
         assert page.evaluate("document.documentElement.scrollWidth") <= width
         buttons = "[...document.querySelectorAll('button:not(.spot), select')].filter((e) => e.offsetParent)"
         assert page.evaluate(f"{buttons}.filter((e) => e.offsetHeight < 24).map((e) => e.outerHTML)") == []
+        assert page.complaints() == []
+
+
+def test_of_many_vehicles_one_is_told_in_full_and_each_turn_is_reached_by_dragging(
+    page: Browser, tmp_path: Path
+) -> None:
+    with serving(mission(tmp_path, VEHICLES), tmp_path) as server:
+        page.visit(server.url)
+        hand = Hand(page)
+        planned(hand)
+        hand.until("!document.querySelector('[data-home]')")
+        told = page.evaluate("document.querySelector('#verdict p').innerText")
+        assert told == f"{VEHICLES} vehicles: path safe; safe return from all of it"
+        hand.click("#vehicle-5")
+        hand.until("document.querySelector('#rest > [data-vehicle=\"5\"]')")
+        assert page.evaluate("document.querySelectorAll('#rest > [data-vehicle]').length") == 1
+        lanes = "document.querySelector('#time .lanes')"
+        x, y = hand.at("#arrive-0")
+        hand.press(x, y)
+        bottom = page.evaluate(f"{lanes}.getBoundingClientRect().bottom")
+        for height in (y + 30, bottom - 6):
+            hand.mouse("mouseMoved", x, height, down=True)
+        hand.until(f"{lanes}.scrollTop + {lanes}.clientHeight > {lanes}.scrollHeight - 2")
+        hand.until(f"document.querySelector('#time .head p').innerText.includes('number {VEHICLES} of {VEHICLES}')")
+        hand.mouse("mouseReleased", x, bottom - 6)
+        planned(hand)
+        assert names(hand)[-1] == "uav1"
+        hand.click("#show-replay")
+        hand.until(f"{SPOTS} === {VEHICLES}")
+        assert page.evaluate("[...document.querySelectorAll('#place .crafts b')].map((e) => e.innerText)") == ["uav6"]
+        hand.click("#fly-sim")
+        assert f"{VEHICLES} vehicles are verified" in sent(hand)
+        assert page.evaluate("document.querySelectorAll('#upload details.vehicle:not([open])').length") == VEHICLES
         assert page.complaints() == []
