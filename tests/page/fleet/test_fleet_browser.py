@@ -62,7 +62,9 @@ def drag_arrival(hand: Hand, vehicle: int, dx: float, dy: float) -> None:
     planned(hand)
 
 
-def test_four_by_clicks_with_dragged_arrivals_are_saved_sent_verified_and_rehearsed(page: Browser, tmp_path: Path) -> None:
+def test_four_by_clicks_with_dragged_arrivals_are_saved_sent_verified_and_rehearsed(
+    page: Browser, tmp_path: Path
+) -> None:
     with serving(None, tmp_path) as server:
         page.visit(server.url)
         hand = Hand(page)
