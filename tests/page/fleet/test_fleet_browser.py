@@ -38,6 +38,7 @@ def planned(hand: Hand) -> None:
 def add(hand: Hand, count: int) -> None:
     """Add vehicles by two clicks each."""
     for start, goal in ENDS[:count]:
+        hand.until("!document.querySelector('[data-home]')")  # the panel does not move any more
         before = hand.page.evaluate("document.querySelectorAll('#fleet .crew li').length || 1")
         hand.click("#vehicle-add")
         for dx, dy in (start, goal):
