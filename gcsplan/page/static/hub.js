@@ -17,7 +17,7 @@ const ANSWERS = new Set(['path', 'bound', 'plan', 'home', 'refused', 'scene']);
 export function take(message) {
   if (ANSWERS.has(message.type)) {
     if (message.n < known.n) return;
-    known.n = message.n;
+    if (message.type !== 'scene') known.n = message.n; // a scene answers a later message; the way home of its plan may follow
   }
   if (message.type === 'state') known.state = message;
   if (message.type === 'plan') known.plan = message;
