@@ -65,6 +65,6 @@ def test_a_refused_schedule_offers_its_own_times_and_to_leave_the_vehicle_out() 
     late = NoSchedule("uav1 is late", vehicle="uav1", interval_s=12.3456, arrive_s=None)
     changes = [found["changes"] for found in attempts(PAIR, late)]
     assert changes == [{"arrival.interval_s": 12.346}, {"arrival.leave_out": True}]
-    lone = NoMission("no path", reason="unreachable", vehicle="uav1")
+    lone = NoMission("no path", reason="not_found", vehicle="uav1")
     assert attempts({"vehicles": [UAV1]}, lone) == []
     assert attempts({**PAIR, "arrival": {"mode": "none", "leave_out": True}}, lone) == []

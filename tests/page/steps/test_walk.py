@@ -21,6 +21,13 @@ from tests.support.browser import Browser
 pytestmark = [pytest.mark.nightly, *IN_A_BROWSER]
 
 
+MIDDLE_OF_PATH = """(() => {
+  const path = document.getElementById('path'), {x, y} = path.getPointAtLength(path.getTotalLength() / 2);
+  const spot = new DOMPoint(x, y).matrixTransform(path.getScreenCTM());
+  return [spot.x, spot.y];
+})()"""
+
+
 def at_rest(hand: Hand) -> None:
     """Wait until the path and its way home are judged, so that the panel does not move any more."""
     hand.until("!document.querySelector('#fly-upload').disabled")
@@ -81,7 +88,8 @@ def test_from_nothing_to_a_verified_upload_an_obstacle_and_the_briefing(page: Br
         hand.click("#upload-close")
         path = page.evaluate("document.getElementById('path').getAttribute('d')")
         hand.click("[data-mode=circle]")
-        hand.drag([(x + 5, y + 40), (x + 12, y + 40), (x + 20, y + 40)])
+        x, y = page.evaluate(MIDDLE_OF_PATH)
+        hand.drag([(x, y), (x + 12, y), (x + 25, y)])
         hand.until("document.querySelector('#zone-name')")
         hand.judged()
         assert page.evaluate("document.getElementById('path').getAttribute('d')") != path
