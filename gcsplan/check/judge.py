@@ -91,7 +91,7 @@ def judge(
         radius_m = {seq: tuning.px4_accepts_m(i)[0] for seq, i in enumerate(stored.items, stored.first_seq)}
     seconds = np.full(len(flight.stretches), math.nan)
     blown: FlightInWind | None = None
-    waits = any(s.until_s is not None for s in flight.stretches)
+    waits = any(s.until_s is not None for s in (*flight.stretches, *flight.others))
     if times or wind or waits or flight.loop_seq is not None or vehicle.energy.base_w:  # the battery depends on them
         clock = FlightTimes(flight.stretches, vehicle, world, home, radius_m)
         seconds = clock.seconds()
@@ -129,7 +129,8 @@ def judge(
 
 
 def _set_waits(flight: Flight, seconds: Floats) -> None:
-    """Give each wait until a time of day the seconds that it lasts in still air; in a round these are not judged."""
+    """Give each wait until a time of day the seconds that it lasts in still air; in a round, and where it is not known
+    when that is flown, these are not judged."""
     rounds = any(s.times > 1 or s.jumped_from is not None for s in flight.stretches)
     now_s = 0.0
     for k, s in enumerate(flight.stretches):
@@ -141,6 +142,7 @@ def _set_waits(flight: Flight, seconds: Floats) -> None:
             now_s = max(s.until_s, now_s)
             continue
         now_s += float(seconds[k]) + s.hold_s
+    flight.not_judged += [Note("waits_until_time", s.seq) for s in flight.others if s.until_s is not None]
 
 
 def _missed_gates(flight: Flight, seconds: Floats, blown: FlightInWind | None) -> list[Finding]:

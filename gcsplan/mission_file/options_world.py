@@ -66,7 +66,7 @@ KEY_OPTIONS = {
     "descent_m_s": "--descent-rate", "dem": "--dem", "vertical_datum": "--vertical-datum", "autopilot": "--autopilot",
     "geoid_grid": "--geoid-grid", "obstacle_height_m": "--obstacle-height", "start": "--home",
     "rtl_rel_home_m": "--rtl-altitude", "return_route": "--return-route", "crs": "--crs",
-    "height_unit": "--height-unit", "nodata": "--nodata", "on_bad": "--on-bad", "ignore": "--ignore",
+    "at": "--at", "height_unit": "--height-unit", "nodata": "--nodata", "on_bad": "--on-bad", "ignore": "--ignore",
 }  # fmt: skip
 """The option for each key of a mission file."""
 
@@ -145,6 +145,12 @@ class OpenWorld:
     def departs_s(self) -> float:
         """When each file's flight begins, seconds UTC since 1970; 0 if the options do not say."""
         return 0.0 if self._flown is None else self._flown.start.timestamp()
+
+    @property
+    def leaves_s(self) -> float | None:
+        """When each file's vehicle leaves the ground, seconds UTC since 1970; None if the options give no time of
+        day."""
+        return None if self._flown is None or begins_with_day(self.options.at) else self.departs_s
 
     def wind(self, extent: WorldExtent) -> tuple[DeclaredWind, tuple[Note, ...]]:
         """The declared winds in a part of the world, still air if there are none, and notes on them. Raises InputError

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from datetime import datetime
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Literal
 
 from gcsplan.mavlink.mission.mission import AltitudeFrame
 from gcsplan.mavlink.mission.return_parameters import ReturnRoute
-from gcsplan.mission_file.published.times import Hours
+from gcsplan.mission_file.published.times import Hours, begins_with_day
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import MissionEnd, Vehicle
 from gcsplan.wind.declared import STILL_AIR, DeclaredWind, FlightWind
@@ -167,6 +167,20 @@ class MissionFile:
             return None
         begins_s = 0.0 if self.departure is None else self.departure.timestamp()
         return FlightWind(self.wind, (begins_s, begins_s + late_s if len(self.vehicles) == 1 else math.inf), late_s)
+
+    @property
+    def start(self) -> datetime | None:
+        """The common start that the mission states: a time of day, UTC, in whole seconds; None without one."""
+        if self.departure is None or self.content is None:
+            return None
+        if self.content.departure is None and begins_with_day(self.content.at or self.content.given.get("at")):
+            return None
+        return self.departure.astimezone(UTC).replace(microsecond=0)
+
+    @property
+    def leaves_s(self) -> float | None:
+        """When a vehicle that flies alone leaves the ground, seconds UTC since 1970; None: not known."""
+        return None if self.start is None or len(self.vehicles) > 1 else self.start.timestamp()
 
     @property
     def changes(self) -> tuple[Note, ...]:

@@ -10,8 +10,10 @@ import math
 import os
 import re
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import Protocol
 
@@ -24,6 +26,7 @@ from gcsplan.app.plan.flight_hours import beyond_forecast, beyond_hours
 from gcsplan.app.plan.way_home import home_of
 from gcsplan.arrays import Floats
 from gcsplan.check.flight.arc_waypoint import curve_bulge
+from gcsplan.check.flight.times import DAY_S
 from gcsplan.check.judge import judge
 from gcsplan.check.motion.flight_state import TERRAIN_ERROR_M
 from gcsplan.check.returns.verdict import WayHome
@@ -51,6 +54,10 @@ HOME_MOVED_M = 1.0
 CIRCLES = frozenset({LOITER_UNLIM, LOITER_TURNS, LOITER_TIME, LOITER_TO_ALT})
 DEFAULT_CIRCLE_M = 150.0
 """Radius of a circle, m, whose own radius is not stated: more than a plane's own circle needs at any altitude."""
+
+
+EARLY_S = 6.0 * 3600.0
+"""A departure so long before a gate is in time for it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,7 +167,8 @@ class MissionSite:
         error_m = source.terrain_error_m if source.altitude_frame == "terrain" else TERRAIN_ERROR_M
         if self._world is None:
             self._world = world_of(source)
-        return judged(request, file, read, self._world, error_m, parts, source.hours, source.flight_wind(request))
+        wind = source.flight_wind(request)
+        return judged(request, file, read, self._world, error_m, parts, source.hours, wind, source.leaves_s)
 
     @property
     def sources(self) -> tuple[Mapping[str, object], tuple[Note, ...]]:
@@ -212,7 +220,8 @@ class OptionsSite:
         file = Path(argument)
         request = _request(opened, read.mission, file.stem, world, wind)
         flown = None if wind.still else FlightWind(wind, (opened.departs_s, opened.departs_s))
-        done = judged(request, file, read, world, self.options.terrain_error_m, parts, opened.hours, flown)
+        error_m = self.options.terrain_error_m
+        done = judged(request, file, read, world, error_m, parts, opened.hours, flown, opened.leaves_s)
         slopes = (slopes_in_wind(request.vehicle),) if request.vehicle.blows_m_s else ()
         return replace(done, typed=self.typed, notes=(*done.notes, *slopes))
 
@@ -337,12 +346,13 @@ def _request(
 
 def judged(
     request: VehicleRequest, file: Path, read: MissionFileRead, world: World, terrain_error_m: float,
-    parts: VerdictParts, hours: Hours | None = None, wind: FlightWind | None = None,
+    parts: VerdictParts, hours: Hours | None = None, wind: FlightWind | None = None, leaves_s: float | None = None,
 ) -> Checked:  # fmt: skip
     """Judge a mission that was read from ``file``, for a vehicle in a world. Raises InputError.
 
     ``hours``: the hours for which zones of the world were left out, from the departure on; the part of a flight beyond
-    them is not judged. ``wind``: the declared winds; None: still air.
+    them is not judged. ``wind``: the declared winds; None: still air. ``leaves_s``: when the vehicle leaves the ground,
+    seconds UTC since 1970; None: not known, unless the mission says it.
     """
     returns, asks_home = parts.returns, parts.returns.judged or parts.returns.required
     vehicle, mission = request.vehicle, read.mission
@@ -353,10 +363,12 @@ def judged(
     if not math.isnan(ground) and Note("home_given") in notes:
         mission = replace(mission, home=replace(mission.home, amsl_m=round(ground, 2)))
     mission = replace(mission, name=vehicle.name, sysid=vehicle.sysid)
-    verdict = judge(
-        mission, vehicle, world, rtl_rel_home_m=request.rtl_rel_home_m, terrain_error_m=terrain_error_m,
+    if mission.leaves_s is None:
+        mission = replace(mission, leaves_s=leaves_s)
+    verdict = _departing(mission, partial(
+        judge, vehicle=vehicle, world=world, rtl_rel_home_m=request.rtl_rel_home_m, terrain_error_m=terrain_error_m,
         misses=parts.misses, times=parts.times or asks_home or hours is not None, wind=wind,
-    )  # fmt: skip
+    ))  # fmt: skip
     verdict, fence_notes = own_fence(read.fence, verdict, vehicle, world, request.rtl_rel_home_m)
     more = [note for note in (beyond_hours(verdict, hours), beyond_forecast(verdict)) if note]
     verdict = replace(verdict, not_judged=(*verdict.not_judged, *read.not_judged, *more))
@@ -374,3 +386,29 @@ def judged(
         file, vehicle, request, mission, verdict, tuple(notes), world, read.fence, read.rally, terrain_error_m, home,
         returns.required, hours,
     )  # fmt: skip
+
+
+def _departing(mission: Mission, judging: Callable[[Mission], Verdict]) -> Verdict:
+    """The verdict on a mission that leaves the ground when it says.
+
+    If it does not say, the verdict is on the latest departure with which it is at its first gate in time. Whether it
+    leaves by then is not judged; the gates after the first do not depend on it.
+    """
+    opens_s = next((item.until_s for item in mission.items if item.until_s is not None), None)
+    tried = mission if mission.leaves_s is not None or opens_s is None else replace(mission, leaves_s=opens_s - EARLY_S)
+    verdict = judging(tried)
+    gates = [leg for leg in verdict.legs if leg.until_s is not None]
+    if not gates or tried.leaves_s is None:
+        return verdict if tried is mission else judging(mission)
+    first, opens_s = gates[0], tried.leaves_s + (gates[0].until_s or 0.0)
+    if tried is mission:
+        note = Note("gates_since_departure", first.seq, leaves=_of_day(tried.leaves_s))
+        return replace(verdict, notes=(*verdict.notes, note))
+    leaves_s = math.floor(opens_s - verdict.gates_after_s()[0])
+    note = Note("gate_departure_unknown", first.seq, opens=_of_day(opens_s), leaves=_of_day(leaves_s))
+    verdict = judging(replace(mission, leaves_s=leaves_s))
+    return replace(verdict, mission=mission, not_judged=(*verdict.not_judged, note))
+
+
+def _of_day(utc_s: float) -> str:
+    return f"{datetime.fromtimestamp(utc_s % DAY_S, UTC):%H:%M:%S}"

@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING
 from gcsplan.errors import InputError, UsageError
 from gcsplan.fleet.arrival import Crew, Slot
 from gcsplan.fleet.motion.timing import Course
-from gcsplan.mission_file.published.times import begins_with_day
 from gcsplan.mission_file.request import MissionFile
 from gcsplan.vehicle import Autopilot
 
@@ -41,12 +40,7 @@ class GateTime:
     @classmethod
     def stated(cls, source: MissionFile) -> GateTime | None:
         """The common start that a mission states: the time of day with which its ``at`` begins; None without one."""
-        content = source.content
-        if source.departure is None or content is None:
-            return None
-        if content.departure is None and begins_with_day(content.at or content.given.get("at")):
-            return None
-        return cls(source.departure.astimezone(UTC).replace(microsecond=0), "at")
+        return None if source.start is None else cls(source.start, "at")
 
     @classmethod
     def require_of(cls, plan: Plan) -> None:

@@ -16,12 +16,14 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack
 from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from gcsplan.app.check.files import check_files
 from gcsplan.app.check.worlds import Checked, split_name
+from gcsplan.app.fleet.start_time import GateTime
 from gcsplan.app.plan.flight_hours import hours_left, waits_s
 from gcsplan.app.plan.model import Plan
 from gcsplan.app.upload.fence import KEY_OF_LIST, NAME_OF_LIST, ListEnds, not_held, upload_lists
@@ -141,11 +143,16 @@ def jobs_of(
 
 
 def jobs_of_files(source: MissionFile, checked: Sequence[Checked], word: str) -> list[UploadJob]:
-    """The upload jobs of checked files; ``word`` as in ``--upload``. Raises UsageError for two files of one vehicle."""
+    """The upload jobs of checked files; ``word`` as in ``--upload``.
+
+    Raises UsageError for two files of one vehicle, and where the departure for which gates are judged is near or past.
+    """
     seen: dict[str, Path] = {}
     for c in checked:
         if seen.setdefault(c.vehicle.name, c.file) is not c.file:
             raise UsageError(f"{seen[c.vehicle.name]} and {c.file} are both for {c.vehicle.name}: give one of them")
+        if c.mission.leaves_s is not None and any(item.until_s is not None for item in c.mission.items):
+            GateTime(datetime.fromtimestamp(c.mission.leaves_s, UTC), "at").require_ahead(datetime.now(UTC))
     to = targets([word], [r.vehicle for r in source.vehicles])
     missing = [c.vehicle.name for c in checked if c.vehicle.name not in to]
     if missing:

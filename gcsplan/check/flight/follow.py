@@ -408,13 +408,12 @@ class _Pilot(Aboard):
             self.flight.not_judged.append(Note("waits_until_time", seq))
 
     def _until_s(self, item: MissionItem) -> float | None:
-        """Seconds from leaving the ground to an item's time of day; None if that, or the departure, is not known."""
-        hour, minute, second = item.params[1:4]
+        """Seconds from leaving the ground to an item's time of day, negative if it was within the twelve hours before;
+        None if that, or the departure, is not known."""
         copter = self.autopilot is Autopilot.ARDUCOPTER and self.airborne and self.known
-        given = 0 <= hour < 24 and 0 <= minute < 60 and 0 <= second < 60
-        if not copter or not given or self.mission.leaves_s is None:
+        if not copter or item.until_s is None or self.mission.leaves_s is None:
             return None
-        return (3600.0 * hour + 60.0 * minute + second - self.mission.leaves_s) % DAY_S
+        return (item.until_s - self.mission.leaves_s + 0.5 * DAY_S) % DAY_S - 0.5 * DAY_S
 
     def _lose(self, seq: int, item: MissionItem) -> None:
         self.direction = None

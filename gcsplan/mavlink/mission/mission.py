@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from gcsplan.errors import InputError
-from gcsplan.mavlink.mission.commands import DO_CHANGE_SPEED, WAYPOINT
+from gcsplan.mavlink.mission.commands import DELAY, DO_CHANGE_SPEED, WAYPOINT
 from gcsplan.vehicle import Autopilot
 
 # Frames (MAV_FRAME). The _INT frames 5, 6, 11 mean the same as 0, 3, 10: both are read, 0, 3, 10 are written.
@@ -103,6 +103,14 @@ class MissionItem:
     def lon_deg(self) -> float:
         """Longitude of a located item, degrees."""
         return self.y / 1e7
+
+    @property
+    def until_s(self) -> float | None:
+        """The second of the day, UTC, until which a delay waits; None for any other item."""
+        hour, minute, second = self.params[1:]
+        given = 0 <= hour < 24 and 0 <= minute < 60 and 0 <= second < 60
+        waits = self.command == DELAY and given and not 0 < self.params[0] < math.inf
+        return 3600.0 * hour + 60.0 * minute + second if waits else None
 
 
 def _from_wire(wire: bytes) -> MissionItem:

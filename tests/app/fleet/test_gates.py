@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import random
 from dataclasses import replace
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from typing import Any
 
 import pytest
 
-from gcsplan import Plan, plan, upload
+from gcsplan import Plan, check, plan, upload
 from gcsplan.app.output.files import summary_of
 from gcsplan.app.rehearse import rehearse, weather_of
 from gcsplan.check.judge import judge
+from gcsplan.check.verdict import Verdict
 from gcsplan.errors import InputError, NoMission, UsageError
 from gcsplan.mavlink.mission import commands as cmd
 from tests.app.fleet.test_every_wind import (
@@ -119,6 +120,30 @@ def test_a_vehicle_that_may_come_after_its_gates_second_breaks_a_limit() -> None
     assert kinds == {False: [], True: ["gate"]}
     unknown = judge(replace(v.mission, leaves_s=None), v.request.vehicle, done.world, wind=wind)
     assert [note.code for note in unknown.not_judged] == ["waits_until_time"]
+
+
+@pytest.mark.nightly
+def test_a_file_with_gates_is_judged_for_its_departure_or_names_the_latest() -> None:
+    [v] = planned(2, UP_TO).vehicles
+    file, mission = replace(v.mission, leaves_s=None), {k: x for k, x in lane(None, UP_TO).items() if k != "arrival"}
+    [gate, later] = [item for item in file.items if item.until_s is not None]
+
+    def at(departure: datetime) -> Verdict:
+        return check(file, mission | {"at": f"{departure:%Y-%m-%dT%H:%M:%SZ}"})
+
+    [why] = check(file, mission).not_judged
+    assert (why.code, why.data["opens"]) == ("gate_departure_unknown", "00:02:25")
+    latest = datetime.strptime(f"2026-03-01 {why.data['leaves']}Z", "%Y-%m-%d %H:%M:%S%z")
+    assert START <= latest <= START + timedelta(seconds=2)  # as the plan counts it
+    assert [at(latest + timedelta(seconds=s)).safe for s in (-3600, 0, 3, 3600)] == [True, True, False, False]
+    assert [n.data["leaves"] for n in at(latest).notes if n.code == "gates_since_departure"] == [why.data["leaves"]]
+    other = mission["vehicles"][0] | {"name": "c2", "sysid": 2}
+    fleet = {"at": f"{START:%Y-%m-%dT%H:%M:%SZ}", "vehicles": [*mission["vehicles"], other]}
+    for open_departure in ({"at": f"{START:%Y-%m-%d}"}, fleet):
+        assert [n.code for n in check(file, mission | open_departure).not_judged] == ["gate_departure_unknown"]
+    sooner = replace(later, params=gate.params)
+    early = replace(file, items=tuple(sooner if item is later else item for item in file.items))
+    assert [finding.kind for finding in check(early, mission).findings] == ["gate"]  # whenever it leaves
 
 
 @pytest.mark.slow
