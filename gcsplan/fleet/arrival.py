@@ -30,6 +30,7 @@ from gcsplan.fleet.motion.timing import Course, Route, TimedPath, speed_for
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import DEFAULT_LEAN_DEG, LARGEST_LEAN_DEG, Autopilot, Vehicle, lean_for_deg, lean_words
 from gcsplan.wind.drift import Drift
+from gcsplan.world.geodesy.atmosphere import true_per_indicated
 
 __all__ = ["WITHIN_S", "Clock", "Craft", "Crew", "Hold", "Longer", "Mode", "NoSchedule", "Schedule", "Slot", "schedule"]
 
@@ -211,6 +212,18 @@ class Craft:
         self.slowest_m_s, self.fastest_m_s = _float32_range(least_m_s, most_m_s)
         self.fast_s = self.course.time_to_goal_s(self.fastest_m_s)
         self.slow_s = self.course.time_to_goal_s(self.slowest_m_s)
+
+    @property
+    def circle_s(self) -> tuple[float, float] | None:
+        """Seconds of a circle of its turn radius at its slowest and at its fastest in still air; None if it is no wing.
+
+        ArduPlane widens circles in thin air by the square of what makes it faster.
+        """
+        if not self.vehicle.keeps_airspeed:
+            return None
+        round_m = math.tau * self.vehicle.turn_radius_m
+        round_m *= float(true_per_indicated(self.crew.route.points[-1:, 2])[0])
+        return round_m / self.slowest_m_s, round_m / self.fastest_m_s
 
     def latest_s(self, hold: Hold) -> float:
         """Its latest arrival with the allowed kind of waiting, s."""
@@ -486,7 +499,7 @@ def _refusal(
     why = f"{one.name} cannot arrive {'in time' if late else 'so late'}: {what} after the start, and at its "
     why += f"{'fastest' if late else 'slowest'} ({speed_m_s:g} m/s) it needs {needs_s:.1f} s"
     if not late:
-        why += "; nobody may wait" if hold == "none" else f"; {_cannot_wait(one)}"
+        why += "; nobody may wait" if hold == "none" else f"; {_cannot_wait(one, at_s)}"
     if not cures:
         return NoSchedule(why, vehicle=one.name)
     fast, latest = np.array([c.fast_s for c in craft]), np.array([c.latest_s(hold) for c in craft])
@@ -517,10 +530,22 @@ def _refusal(
     return NoSchedule(f"{why}; {'; '.join(words)}", vehicle=one.name, interval_s=interval, arrive_s=earliest)
 
 
-def _cannot_wait(one: Craft) -> str:
+def _cannot_wait(one: Craft, at_s: float) -> str:
     if one.vehicle.can_hold:
         return f"a hold is at most {LONGEST_HOLD_S:.0f} s"
-    return f"{one.vehicle.autopilot} cannot hold in the air for a set time"
+    why, circle_s = f"{one.vehicle.autopilot} cannot hold in the air for a set time", one.circle_s
+    if circle_s is None:
+        return why
+    slow_s, fast_s = circle_s
+    count = math.ceil((at_s - one.slow_s) / slow_s)
+    fits = one.fast_s + count * fast_s <= at_s
+    return (
+        f"{why}, and no longer path was found; "
+        + (f"{count} whole circle{'' if count == 1 else 's'} " if fits else "whole circles ")
+        + f"of {one.vehicle.turn_radius_m:g} m ({fast_s:.1f} to {slow_s:.1f} s each) "
+        + ("would take so long, but it " if fits else "do not fit, and it ")
+        + "leaves a circle only on the heading of its next leg, up to one circle later: none is planned"
+    )
 
 
 def _up(seconds: float) -> str:

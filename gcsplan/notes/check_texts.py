@@ -123,12 +123,10 @@ CHECK_TEXTS = {
         "it may come to its gate {by_s:seconds.1} too late for the gate's second, and would wait there until the next "
         "day"
     ),
-    "gates_since_departure": (
-        "it leaves the ground at {leaves} UTC ({key:at}): its gates are judged for that"
-    ),
+    "gates_since_departure": ("it leaves the ground at {leaves} UTC ({key:at}): its gates are judged for that"),
     "gate_departure_unknown": (
-        "its first gate opens at {opens} UTC, and it is not known when it leaves the ground: it is there in time if that is "
-        "no later than {leaves} UTC, for which all else is judged; {key:at} of a vehicle that flies alone says when it leaves"
+        "its first gate opens at {opens} UTC: it must leave the ground by {leaves} UTC, for which all else is judged; "
+        "{key:at} says when a vehicle leaves that flies alone"
     ),
     "waits_until_time": ("the energy of a wait until a time of day is not known; give its seconds (param1)"),
     "hold_without_known_end": (

@@ -182,6 +182,25 @@ def test_what_cannot_hold_in_the_air_is_refused_a_gate_by_name(change: dict[str,
     assert schedule(crews, "together").of("near").depart_s > 0
 
 
+@pytest.mark.parametrize(
+    ("speeds_m_s", "words"), [((10.0, 20.0), "4 whole circles of 80 m"), ((19.9, 20.0), "do not fit")]
+)
+def test_a_wing_that_could_only_circle_is_refused_by_the_number_of_circles(
+    speeds_m_s: tuple[float, float], words: str
+) -> None:
+    low, high = speeds_m_s
+    wing = {"autopilot": Autopilot.ARDUPLANE, "turn_radius_m": 80.0, "speed_min_m_s": low, "speed_max_m_s": high}
+    crews = [crew("far", 3000), crew("near", 300, **wing)]
+    with pytest.raises(NoSchedule, match=rf"no longer path was found.*{words}.*up to one circle later") as caught:
+        schedule(crews, "together", hold="gate")
+    near, due_s = Craft(crews[1]), Craft(crews[0]).fast_s
+    assert near.circle_s is not None
+    slow_s, fast_s = near.circle_s
+    assert slow_s == pytest.approx(2 * math.pi * 80.0 / low, rel=0.01)
+    counts = [n for n in range(100) if near.fast_s + n * fast_s <= due_s <= near.slow_s + n * slow_s]
+    assert [f"; {n} whole circle" in str(caught.value) for n in counts[:1]] == [True] * bool(counts)
+
+
 def test_a_gate_is_not_longer_than_the_autopilot_stores() -> None:
     crews = [crew("far", 300_000, speed_max_m_s=3.0), crew("near", 300)]
     with pytest.raises(NoSchedule, match="at most 65535 s"):

@@ -174,7 +174,10 @@ def flown(ship: Ship, winds: Winds, share_of: Callable[[int], Share], origin: tu
                 step_s = min(step_s, (run_m - done) / v)
                 done += v * step_s
                 part = min(done / run_m, 1.0)
-                go((begun[0] + part * run_m * unit[0], begun[1] + part * run_m * unit[1], begun[2] + part * rise_m), step_s)
+                go(
+                    (begun[0] + part * run_m * unit[0], begun[1] + part * run_m * unit[1], begun[2] + part * rise_m),
+                    step_s,
+                )
             at = way.to
             v = 0.0 if way.stops else v
         if way.waits_s:
@@ -200,7 +203,9 @@ def _ground_m_s(ship: Ship, speed_m_s: float, slope: float, up_m: float, along: 
 
 def least_m(a: Track, b: Track) -> tuple[float, float]:
     """The least distance of two while both fly, m; and the same with circles at their nearest points."""
-    times = np.arange(max(a.begins_s, b.begins_s), min(t.begins_s + (len(t.places) - 1) * STEP_S for t in (a, b)), STEP_S)
+    times = np.arange(
+        max(a.begins_s, b.begins_s), min(t.begins_s + (len(t.places) - 1) * STEP_S for t in (a, b)), STEP_S
+    )
     if not len(times):
         return math.inf, math.inf
     at = [

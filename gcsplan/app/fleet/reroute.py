@@ -21,6 +21,7 @@ from gcsplan.fleet.motion.timing import Route
 from gcsplan.mission_file import VehicleRequest
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.path import nearest_on
 from gcsplan.world.geometry.zones import Circle, Level, Zone
 from gcsplan.world.world import World
 
@@ -72,7 +73,8 @@ class Detours:
         return None
 
     def longer(self, name: str, length_m: float) -> Route | None:
-        """A route of about ``length_m``: a zigzag over the present path, the widest that fits; None if none does."""
+        """A route of about ``length_m``: a zigzag over the present path and through the vehicle's own via points, the
+        widest that fits; None if none does."""
         plan = self._plans[name]
         request, points = plan.request, plan.solution.path.points
         legs_m = np.linalg.norm(np.diff(points, axis=0), axis=1)
@@ -80,8 +82,10 @@ class Detours:
         length_m *= 1.0 + LONGER_BY  # a slightly longer path is flown slightly faster; a shorter one cannot be used
         along_m = np.concatenate([[0.0], np.cumsum(legs_m)])
         way = points[-1, :2] - points[0, :2]
-        if request.via or not np.hypot(*way) > 0.0:
-            return None  # the order of the via points is fixed, so none can be added
+        if not np.hypot(*way) > 0.0:
+            return None
+        own = np.array([place[:2] for place in request.via]).reshape(-1, 2)
+        passed_m = np.maximum.accumulate(nearest_on(own, points[:, :2])[1])
         aside = np.array([-way[1], way[0]]) / np.hypot(*way)
         for teeth in TEETH:  # each tooth is two equal sides of a triangle over its part of the track
             off_m = math.sqrt(max(0.0, length_m**2 - now_m**2)) / (2.0 * teeth)
@@ -89,7 +93,9 @@ class Detours:
             middle = np.column_stack([np.interp(at_m, along_m, points[:, k]) for k in (0, 1)])
             for side in (1.0, -1.0):
                 turns = middle + (side * off_m * (-1.0) ** np.arange(teeth))[:, None] * aside
-                via = tuple((float(east), float(north), None) for east, north in turns)
+                teeth_via = [(float(east), float(north), None) for east, north in turns]
+                row = np.argsort(np.concatenate([passed_m, at_m]), kind="stable").tolist()
+                via = tuple([*request.via, *teeth_via][k] for k in row)
                 route = self._planned(name, replace(request, via=via))
                 if route is not None:
                     return route

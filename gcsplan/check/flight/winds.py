@@ -309,19 +309,26 @@ class FlightInWind:
     def _held_s(self) -> tuple[Floats, Floats]:
         """(N,) the shortest and the longest hold at the end of each stretch: whole circles take longer in a wind.
 
-        Without waits until a time of day, after which times begin anew.
+        Without waits until a time of day, after which times begin anew. ArduPlane leaves a circle when its nose points
+        to the next item, up to a circle later (navigation.cpp, `verify_loiter_heading`), and counts turns from where it
+        is first on the circle: a hold there may be half a circle shorter.
         """
         hold = np.array([0.0 if math.isinf(s.hold_s) else s.hold_s for s in self.stretches])
         hold[self._waits] = 0.0
         least, most = hold.copy(), hold.copy()
         slowest_m_s = 0.0 if self.wind.varying else float(self.wind.speed_m_s[..., 0].min())
         for i, s in enumerate(self.stretches):
-            if s.turns and hold[i] > 0.0:
+            if self._circles[i] or (s.turns and hold[i] > 0.0):
                 amsl_m, speed = np.array([s.end[2]]), np.array([s.speed_m_s])
                 bounds = air_m_s(self.vehicle, speed, np.zeros((1, 2)), amsl_m)
                 own = math.inf if self.vehicle.keeps_airspeed else s.speed_m_s
-                least[i] *= circle_ratio(slowest_m_s, float(bounds[1][0]), own)
-                most[i] *= circle_ratio(self.wind.most_m_s, float(bounds[0][0]), own)
+                longest = circle_ratio(self.wind.most_m_s, float(bounds[0][0]), own)
+                if s.turns:
+                    least[i] *= circle_ratio(slowest_m_s, float(bounds[1][0]), own)
+                    most[i] *= longest
+                if self._circles[i]:
+                    circle_s = longest * math.tau * s.reach_m / float(bounds[0][0])
+                    least[i], most[i] = max(least[i] - 0.5 * circle_s, 0.0), most[i] + circle_s
         return least, most
 
     def _since_gate(self, total: Floats) -> Floats:
@@ -468,11 +475,18 @@ class FlightInWind:
         return None if spare[worst] > 0.0 else (worst, places.wind_of(worst, cells[0]))
 
     @cached_property
+    def _circles(self) -> Bools:
+        """(N,) whether a stretch is a fixed wing's circle that it leaves again."""
+        wing = self.vehicle.keeps_airspeed
+        return np.array([wing and s.reach_m > 0.0 and s.start == s.end and math.isfinite(s.hold_s)
+                         for s in self.stretches])  # fmt: skip
+
+    @cached_property
     def _stays(self) -> Bools:
         """(N,) whether it keeps a place, or a circle, on a stretch or at its end."""
         wing = self.vehicle.keeps_airspeed
-        return np.array([(s.hold_s > 0.0 and (not wing or s.reach_m > 0.0)) or (s.column and not wing)
-                         for s in self.stretches])  # fmt: skip
+        stays = [(s.hold_s > 0.0 and (not wing or s.reach_m > 0.0)) or (s.column and not wing) for s in self.stretches]
+        return np.array(stays) | self._circles
 
     def _places(self, wind: DeclaredWind) -> WindsAlong:
         """The winds over the stretches' places, at any hour of the flight."""

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from gcsplan.app.output.files import summary_of
 from gcsplan.notes.note import Note
+from gcsplan.world.geometry.path import nearest_on
 from tests.app.fleet.test_fleet import nearest_m, planned, sequence
 
 
@@ -31,3 +33,17 @@ def test_where_nobody_may_wait_a_longer_path_makes_up_for_the_time() -> None:
     assert [note["code"] for note in south["notes_data"]].count("flies_longer") == 1
     assert done.vehicles[1].verdict.safe is True
     assert south["lower_bound_m"] == pytest.approx(1000.0, abs=0.1)  # of its own request, not of the zigzag's vias
+
+
+@pytest.mark.slow
+def test_a_longer_path_still_passes_its_via_points_in_their_order() -> None:
+    via = [(60.0, -200.0), (-60.0, 100.0)]
+    keys = [{"east_m": east, "north_m": north} for east, north in via]
+    done = planned(sequence(60, hold="none"), {}, {"speed_m_s": [9, 10], "via": keys})
+    assert done.fleet is not None
+    assert [note.code for note in done.fleet.slots[1].notes].count("flies_longer") == 1
+    points = done.vehicles[1].solution.path.points[:, :2]
+    away_m, along_m = nearest_on(np.array(via), points)
+    assert away_m.max() < 0.5
+    assert along_m[0] < along_m[1]
+    assert done.fleet.slots[1].arrive_s - done.fleet.slots[0].arrive_s == pytest.approx(60.0, abs=1e-3)

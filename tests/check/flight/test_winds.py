@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 from dataclasses import replace
 from typing import Any
@@ -23,13 +24,14 @@ from gcsplan.check.flight.winds import (
 from gcsplan.check.judge import judge
 from gcsplan.check.verdict import Verdict
 from gcsplan.fleet.motion.timing import legs
+from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.vehicle import Autopilot, Energy, Vehicle
 from gcsplan.wind.declared import DeclaredWind, FlightWind
 from gcsplan.wind.window import TimeWindow
 from gcsplan.world.geodesy.atmosphere import true_per_indicated
 from tests.check.test_judge import ideal, mission_over
 from tests.oracles import wind as oracle
-from tests.support.wings import through, wing
+from tests.support.wings import at, mission, take_off, through, wing
 from tests.support.worlds import vehicle, world
 
 THERE = [[0.0, 0, 366], [2500, -900, 366], [4000, 1500, 366]]
@@ -160,6 +162,47 @@ def test_a_wing_arrives_when_the_pilots_handbook_says() -> None:
     assert verdict.legs[2].horizontal_m == pytest.approx(2.2 * mile_m, rel=1e-3)
     assert earliest_s - begins_s == pytest.approx(90.0, rel=0.5 / 88.0)
     assert latest_s == pytest.approx(earliest_s, abs=1e-6)
+
+
+def circled_s(wind_m_s: tuple[float, float], air_m_s: float, turns: int, radius_m: float, after: complex) -> float:
+    """Seconds from 1,500 m west of a circle's middle, clockwise around it, and on to ``after`` when the nose is within
+    10° of it (``verify_loiter_heading``); east is real. It is on the circle at once where it meets it."""
+    wind, at, clock, turned, step = complex(*wind_m_s), complex(-radius_m), 0.0, 0.0, 0.02
+
+    def speed(course: complex) -> float:
+        along = wind * course.conjugate()
+        return along.real + math.sqrt(air_m_s**2 - along.imag**2)
+
+    clock = (1500.0 - radius_m) / speed(1 + 0j)
+    while True:
+        course = at / abs(at) * -1j
+        if turned > math.tau * turns and abs(cmath.phase((after - at) / course)) < math.radians(10.0):
+            break
+        angle = speed(course) * step / radius_m
+        at, clock, turned = at * cmath.rect(1.0, -angle), clock + step, turned + angle
+    way = after - at
+    return clock + abs(way) / speed(way / abs(way))
+
+
+@pytest.mark.nightly_but("back")
+@pytest.mark.slow
+@pytest.mark.parametrize("after", [2500j, -2500j, -2500 + 200j], ids=["north", "south", "back"])
+def test_a_wing_leaves_its_circles_on_its_next_heading_within_its_window(after: complex) -> None:
+    last = 1.5 * after
+    items = [at(cmd.WAYPOINT, 1500.0, 0.0, 80.0, 0.0, 1.0), at(cmd.LOITER_TURNS, 3000.0, 0.0, 80.0, 2.0, 0.0, 100.0),
+             at(cmd.WAYPOINT, 3000.0 + after.real, after.imag, 80.0, 0.0, 1.0),
+             at(cmd.LOITER_UNLIM, 3000.0 + last.real, last.imag, 80.0, 0.0, 0.0, 100.0)]  # fmt: skip
+    flat, craft = mission(take_off(), *items), wing()
+    for from_deg in (20.0, 140.0, 260.0):
+        verdict = judge(flat, craft, world(), wind=blows((5, 5), (from_deg, from_deg)))
+        seqs, ends = [leg.seq for leg in verdict.legs], ends_of(verdict)
+        begin, end = (max(k for k, seq in enumerate(seqs) if seq == item) for item in (2, 4))
+        blown = -5.0 * cmath.rect(1.0, math.radians(90.0 - from_deg))
+        air_m_s = 20.0 * float(true_per_indicated(np.array([380.0]))[0])
+        took_s = circled_s((blown.real, blown.imag), air_m_s, 2, 100.0, after)
+        assert ends.earliest_s[end] - ends.earliest_s[begin] <= took_s <= ends.latest_s[end] - ends.latest_s[begin]
+        circle_s = math.tau * 100.0 / air_m_s
+        assert ends.latest_s[end] - ends.earliest_s[end] < 2.2 * circle_s
 
 
 @pytest.mark.slow
