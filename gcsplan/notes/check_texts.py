@@ -123,7 +123,7 @@ CHECK_TEXTS = {
         "it may come to its gate {by_s:seconds.1} too late for the gate's second, and would wait there until the next "
         "day"
     ),
-    "gates_since_departure": ("it leaves the ground at {leaves} UTC ({key:at}): its gates are judged for that"),
+    "gates_since_departure": ("its gates are judged for leaving the ground at {leaves} UTC"),
     "gate_departure_unknown": (
         "its first gate opens at {opens} UTC: it must leave the ground by {leaves} UTC, for which all else is judged; "
         "{key:at} says when a vehicle leaves that flies alone"

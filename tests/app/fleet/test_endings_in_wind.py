@@ -68,8 +68,10 @@ def test_endings_keep_apart_in_each_wind_that_is_drawn(seed: int) -> None:
     assert done.fleet.separation is not None or len(done.vehicles) < 2
     varying = mission["wind"]["varying"]
     for share in some_shares(6, seed):
-        each = [(rng.random(), rng.random()) for _ in range(100)] if varying else [share] * 100
-        tracks = {ship.name: flown(ship, winds, each.__getitem__, ORIGIN_DEG) for ship in ships(done)}
+        tracks = {}
+        for ship in ships(done):
+            each = [(rng.random(), rng.random()) for _ in range(100)] if varying else [share] * 100
+            tracks[ship.name] = flown(ship, winds, each.__getitem__, ORIGIN_DEG)
         for a, b in combinations(tracks.values(), 2):
             point_m, nearest_m = least_m(a, b)
             apart = done.fleet.separation

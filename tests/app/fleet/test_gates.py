@@ -5,17 +5,22 @@ from __future__ import annotations
 import random
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from gcsplan import Plan, check, plan, upload
+from gcsplan.app.check.files import check_files
 from gcsplan.app.output.files import summary_of
 from gcsplan.app.rehearse import rehearse, weather_of
+from gcsplan.app.upload.run import jobs_of_files
 from gcsplan.check.judge import judge
 from gcsplan.check.verdict import Verdict
 from gcsplan.errors import InputError, NoMission, UsageError
+from gcsplan.mavlink.files.waypoints_file import write_waypoints
 from gcsplan.mavlink.mission import commands as cmd
+from gcsplan.mission_file import load_mission
 from tests.app.fleet.test_every_wind import (
     SEPARATION_M,
     WITHIN_M,
@@ -144,6 +149,18 @@ def test_a_file_with_gates_is_judged_for_its_departure_or_names_the_latest() -> 
     sooner = replace(later, params=gate.params)
     early = replace(file, items=tuple(sooner if item is later else item for item in file.items))
     assert [finding.kind for finding in check(early, mission).findings] == ["gate"]  # whenever it leaves
+
+
+@pytest.mark.nightly
+def test_a_file_with_gates_is_uploaded_for_a_departure_that_is_ahead(tmp_path: Path) -> None:
+    [v] = planned(1, UP_TO).vehicles
+    (tmp_path / "c1.waypoints").write_text(write_waypoints(v.mission))
+    mission = {k: x for k, x in lane(None, UP_TO).items() if k != "arrival"}
+    source = load_mission(mission | {"at": f"{START:%Y-%m-%dT%H:%M:%SZ}"})
+    checked = check_files(source, [str(tmp_path / "c1.waypoints")])
+    assert [c.verdict.safe for c in checked] == [True]
+    with pytest.raises(UsageError, match="at: the start is past"):
+        jobs_of_files(source, checked, "udpout:127.0.0.1:14550")
 
 
 @pytest.mark.slow
