@@ -66,7 +66,7 @@ KEY_OPTIONS = {
     "descent_m_s": "--descent-rate", "dem": "--dem", "vertical_datum": "--vertical-datum", "autopilot": "--autopilot",
     "geoid_grid": "--geoid-grid", "obstacle_height_m": "--obstacle-height", "start": "--home",
     "rtl_rel_home_m": "--rtl-altitude", "return_route": "--return-route", "crs": "--crs",
-    "at": "--at", "height_unit": "--height-unit", "nodata": "--nodata", "on_bad": "--on-bad", "ignore": "--ignore",
+    "height_unit": "--height-unit", "nodata": "--nodata", "on_bad": "--on-bad", "ignore": "--ignore",
 }  # fmt: skip
 """The option for each key of a mission file."""
 

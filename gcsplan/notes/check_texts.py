@@ -126,7 +126,7 @@ CHECK_TEXTS = {
     "gates_since_departure": ("its gates are judged for leaving the ground at {leaves} UTC"),
     "gate_departure_unknown": (
         "its first gate opens at {opens} UTC: it must leave the ground by {leaves} UTC, for which all else is judged; "
-        "{key:at} says when a vehicle leaves that flies alone"
+        "`at` (or --at) says when a vehicle leaves that flies alone"
     ),
     "waits_until_time": ("the energy of a wait until a time of day is not known; give its seconds (param1)"),
     "hold_without_known_end": (
