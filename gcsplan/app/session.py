@@ -57,7 +57,7 @@ MOST_WORLDS = 2
 """Most worlds that are kept: the mission's, and that of the drafts of one vehicle alone."""
 
 AT_PLACE_M = 0.05
-"""A way point of a path that lies so near to an end or a via is at that place, m."""
+"""A way point of a path that lies so near to a via is at that place, m."""
 
 _STEP = re.compile(r"\.?([^.\[\]]+)|\[(\d+)\]")
 """A step of a key's place: a name, or the number of an element."""
@@ -281,15 +281,13 @@ class _Listening:
     ) -> None:  # fmt: skip
         self._frame, self._on_path, self._on_bound, self._begun_s = source.frame, on_path, on_bound, begun_s
         self._tracks = tracks
-        self._ends = {
-            v.vehicle.name: np.array([v.start[:2], *(p[:2] for p in v.via), v.goal[:2]]) for v in source.vehicles
-        }
-        for name in tracks.keys() - self._ends.keys():
+        self._vias = {v.vehicle.name: np.array([p[:2] for p in v.via]).reshape(-1, 2) for v in source.vehicles}
+        for name in tracks.keys() - self._vias.keys():
             del tracks[name]
         self._known: dict[str, tuple[float, float, float]] = {}  # by vehicle: cost, bound, seconds of its search
 
     def known_tracks(self) -> dict[str, Floats]:
-        """(N, 3) east_m, north_m, amsl_m of the way points of each vehicle's last path, without its ends and vias."""
+        """(N, 3) east_m, north_m, amsl_m of the way points of each vehicle's last path, without its vias."""
         return {
             name: np.column_stack([self._frame.to_plane(track[:, 0], track[:, 1]), track[:, 2]])
             for name, track in self._tracks.items()
@@ -306,7 +304,7 @@ class _Listening:
             cost = state.cost
             points = state.path.points
             degrees = self._frame.to_degrees(points[:, 0], points[:, 1])
-            away_m = np.linalg.norm(points[:, None, :2] - self._ends[vehicle], axis=-1).min(axis=1)
+            away_m = np.linalg.norm(points[:, None, :2] - self._vias[vehicle], axis=-1).min(axis=1, initial=np.inf)
             self._tracks[vehicle] = np.column_stack([degrees, points[:, 2]])[away_m > AT_PLACE_M]
             if self._on_path is not None:
                 lat, lon = degrees.T

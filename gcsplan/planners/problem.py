@@ -91,8 +91,8 @@ class Problem:
     which. ``leaving``: if a bound above this cost is found, the search ends, because paths that leave the surface may
     cost as little: more terrain is needed first.
 
-    ``known`` (N, 3): east_m, north_m, amsl_m of the way points, without ends and vias, of a path that was legal before
-    places or zones moved. A planner may try it first.
+    ``known`` (N, 3): east_m, north_m, amsl_m of the way points of a path that was legal before places or zones moved,
+    with the ends that it had, without its vias. A planner may try it first.
     """
 
     airspace: Airspace

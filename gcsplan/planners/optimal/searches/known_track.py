@@ -1,18 +1,26 @@
 """A path that was legal before places or zones moved, drawn through the places as they are now.
 
-While somebody drags a point, the path changes little from one place to the next; this takes a few checked legs.
+While somebody drags a point, the path changes little from one place to the next; this takes a few checked legs. It
+leads straight from the last way point to the new end; else by way of the old end, so that it keeps its side of a zone.
 """
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 
 from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.optimal.loop.search import Search, Size
 from gcsplan.planners.problem import Problem
+from gcsplan.planners.profile.exact import way_points
+from gcsplan.planners.profile.track import Flown, fly, make_track
 
 KNOWN_S = 2.05e-3
 """Counted seconds of the path: a little more than of the straight one, which goes first, and less than of all else."""
+
+SAME_PLACE_M = 0.05
+"""An end of the known path that lies so near to an end as it is now has not moved, m."""
 
 
 class KnownTrack(Search):
@@ -29,11 +37,20 @@ class KnownTrack(Search):
         return self.takes(KNOWN_S)
 
     def run(self) -> None:
-        """Take the known path if the exact check passes it; without the way points that it no longer needs."""
-        assert self.problem.known is not None
-        points, pinned = through_places(self.problem, self.problem.known)
-        if not self.incumbent.judge.violations(points):
+        """Take the known path if the exact check passes it: without its old ends, or else with them. Legs that do not
+        pass get another profile; way points that are no longer needed go."""
+        problem, judge, known = self.problem, self.incumbent.judge, self.problem.known
+        assert known is not None
+        moved = np.linalg.norm(known[:, None] - [problem.start, problem.goal], axis=-1).min(axis=1) > SAME_PLACE_M
+        for kept in (known[1:-1], known[moved]):
+            points, pinned = through_places(problem, kept)
+            if broken := judge.violations(points):
+                found = redrawn(problem, points, pinned, (broken[0][0], broken[-1][0]))
+                if found is None or judge.violations(found[0]):
+                    continue
+                points, pinned = found
             self.incumbent.take_simpler(points, pinned, fine=False, longer=False)
+            return
 
 
 def through_places(problem: Problem, known: Floats) -> tuple[Floats, Bools]:
@@ -56,3 +73,22 @@ def through_places(problem: Problem, known: Floats) -> tuple[Floats, Bools]:
         stay += [False] * nearest + [True]
         rest = rest[nearest:]
     return np.array([*way, *rest, goal]), np.array([*stay, *[False] * len(rest), True])
+
+
+def redrawn(problem: Problem, points: Floats, pinned: Bools, legs: tuple[int, int]) -> tuple[Floats, Bools] | None:
+    """The path (N, 3) with another profile from the leg before the first of ``legs`` to the leg behind the last, and
+    which points must stay; None if no profile leads over that part of its track. Points ``pinned`` (N,) keep their
+    altitudes."""
+    first, last = max(legs[0] - 1, 0), min(legs[1] + 2, len(points) - 1)
+    part, stay = points[first : last + 1], pinned[first : last + 1].copy()
+    stay[[0, -1]] = True
+    piece = replace(problem, start=tuple(part[0].tolist()), goal=tuple(part[-1].tolist()), via=())
+    track = make_track(piece, part[:, :2], stay, part[:, 2])
+    flown = fly(piece, track)
+    if not isinstance(flown, Flown):
+        return None
+    drawn, must = way_points(piece, track, flown)
+    must[[0, -1]] = pinned[[first, last]]
+    return np.vstack([points[:first], drawn, points[last + 1 :]]), np.concatenate(
+        [pinned[:first], must, pinned[last + 1 :]]
+    )
