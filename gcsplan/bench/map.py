@@ -1,4 +1,4 @@
-"""The server of `gcsplan map`: time from a pointer's message to the path, from the release to the certificate; memory.
+"""The server of `gcsplan map`: time from a pointer's message to the path, from the release to verdict and plan; memory.
 
 The page is a plain client of the WebSocket here: what a browser takes to draw is apart from it.
 """
@@ -70,8 +70,9 @@ def report(result: dict[str, Any]) -> str:
         if key in result:
             one = result[key]
             counts = f"{one['paths']} paths, {one['refused']} refused, {one['plans']} plans"
-            path, plan = _in_words(one, "path"), _in_words(one, "plan")
-            lines.append(f"{key.replace('_', ' ')}: pointer to path {path}; release to certificate {plan}; {counts}")
+            path, first, plan = (_in_words(one, name) for name in ("path", "verdict", "plan"))
+            words = f"pointer to path {path}; release to verdict {first}; to the whole plan {plan}; {counts}"
+            lines.append(f"{key.replace('_', ' ')}: {words}")
     if "memory" in result:
         memory = result["memory"]
         grown = f"{memory['grown_bytes'] / 1e3:+.0f} kB of Python's"
@@ -98,6 +99,10 @@ class _Client:
         """Send a message; the first answer to it of one of the kinds ``until``."""
         self._n += 1
         self._socket.send(json.dumps({"type": kind, "n": self._n, **more}))
+        return self.until(*until)
+
+    def until(self, *until: str) -> dict[str, Any]:
+        """The next answer to the newest message of one of the kinds ``until``."""
         while True:
             answer: dict[str, Any] = json.loads(self._socket.recv(timeout=PAGE_ANSWER_S))
             if answer["type"] in until and answer["n"] == self._n:
@@ -142,9 +147,9 @@ def _drag(middle: tuple[float, float], rng: np.random.Generator, places: int) ->
 def _measured(
     page: _Client, middle: tuple[float, float], drags: int, rng: np.random.Generator, count: int
 ) -> dict[str, Any]:
-    """Milliseconds over the socket, from each place to its path, and from each release to the plan: by the clock, and
-    of the processor, which server and page together take."""
-    paths, plans, refused = _Times(), _Times(), 0
+    """Milliseconds over the socket, from each place to its path, and from each release to the first verdict and to the
+    plan: by the clock, and of the processor, which server and page together take."""
+    paths, verdicts, plans, refused = _Times(), _Times(), _Times(), 0
     for drag in range(drags + 1):
         places = _drag(middle, rng, count)
         for place in places:
@@ -154,13 +159,18 @@ def _measured(
             if answer["type"] == "path" and drag:  # the first drag warms up
                 paths.end()
         plans.begin()
-        answer = page.ask("change", "plan", "refused", "error", changes={GOAL: places[-1]})
+        verdicts.begin()
+        answer = page.ask("change", "interim", "plan", "refused", "error", changes={GOAL: places[-1]})
+        if answer["type"] in ("interim", "plan") and drag:
+            verdicts.end()
+        if answer["type"] == "interim":
+            answer = page.until("plan", "refused", "error")
         if answer["type"] == "plan" and drag:
             plans.end()
         page.ask("units", "home", "refused", "error", units="metric")
     return {
         "paths": len(paths.clock_ms), "refused": refused, "plans": len(plans.clock_ms), **paths.quantiles("path"),
-        **plans.quantiles("plan"),
+        **verdicts.quantiles("verdict"), **plans.quantiles("plan"),
     }  # fmt: skip
 
 

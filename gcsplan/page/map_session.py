@@ -17,7 +17,7 @@ from typing import Any, Protocol
 
 from gcsplan.app.plan.model import Plan
 from gcsplan.app.plan.way_home import home_of, homes_of, is_required
-from gcsplan.app.session import BetterPath, path_of
+from gcsplan.app.session import BetterPath, Planner, path_of
 from gcsplan.check.returns.verdict import WayHome
 from gcsplan.errors import Cancelled, GcsplanError, InputError, Mistake, NoMission, cancelled_by
 from gcsplan.mission_file.kept import KeptWorld
@@ -50,6 +50,9 @@ IDLE_S = 1.0
 
 MOST_MESSAGES_WAITING = 1000
 """Most messages that wait; live ones of one drag are joined."""
+
+DRAGGED_ALONE = {"planner.name": "optimal", "planner.gap_percent": 100.0, "planner.budget_s": 0.05}
+"""Keys with which a plan ends with the path of the drag, if that is legal."""
 
 _PLACE_OF = re.compile(r"vehicles\[(\d+)\]\.(?:start|goal|via)$")
 
@@ -110,6 +113,7 @@ class MapSession:
         self._n = 0
         self._planning_live: bool | None = None
         self._begun_s, self._patience_s = 0.0, LIVE_S
+        self._followed = False  # a path of the drag was shown
         self._owed = False
         self._homeless: tuple[int, Plan] | None = None  # a plan, with its n, whose way home is to be sent
         self._costs: dict[str, float] = {}
@@ -364,8 +368,9 @@ class MapSession:
         try:
             if self._held is not None or (self._superseded and not live):
                 return  # a message waits behind the drag, or what is owed comes after it
+            hears = None if not live and self._judge_dragged(n, planner) else on_path
             changes = dict(edits.live) if live else None
-            plan = planner.plan(changes, on_path=on_path, on_bound=on_bound, alone=alone, draft=live)
+            plan = planner.plan(changes, on_path=hears, on_bound=on_bound, alone=alone, draft=live)
             self._planning_live = None
             if live:
                 for v in plan.vehicles:  # of a planner that tells no progress
@@ -375,6 +380,7 @@ class MapSession:
             self._send_plan(n, plan, time.perf_counter() - begun_s)
             self._owed = False
         except _Enough:
+            self._followed = True
             self._patience_s = min(max(LIVE_S, 3.0 * (time.monotonic() - self._begun_s)), LIVE_MOST_S)
         except Cancelled:
             self._patience_s = min(2.0 * self._patience_s, LIVE_MOST_S)
@@ -383,15 +389,36 @@ class MapSession:
             self._send(answers.refused_answer(n, why, planner.mission, self._units, live=live))
         except InputError as why:
             self._owed = False
-            if not live:
-                self._problems = why.problems
-                self._send_state()
-            self._send(answers.error_answer(n, why, "bad_mission"))
+            self._send_mistakes(n, why, live=live)
         except Exception as why:  # the page must hear of a bug, and the session goes on
             self._owed = False
             self._send(answers.error_answer(n, GcsplanError(f"a bug of gcsplan: {why!r}"), "internal"))
         finally:
             self._planning_live = None
+
+    def _send_mistakes(self, n: int, why: InputError, *, live: bool) -> None:
+        """Send what is wrong with the mission; unless it is only dragged, the state with each mistake at its field."""
+        if not live:
+            self._problems = why.problems
+            self._send_state()
+        self._send(answers.error_answer(n, why, "bad_mission"))
+
+    def _judge_dragged(self, n: int, planner: Planner) -> bool:
+        """Send the verdict on the only vehicle's path as it was dragged, without its way home, if it is safe: it stands
+        while the search goes on, whose bounds make its gap smaller. Returns whether it was sent. Raises Cancelled."""
+        begun_s = time.perf_counter()
+        followed, self._followed = self._followed, False
+        if not followed or len(self._names) != 1:
+            return False
+        with suppress(NoMission, InputError):  # the search that follows has the words
+            plan = planner.plan(DRAGGED_ALONE, draft=True)
+            [v] = plan.vehicles
+            if v.verdict.safe is True:
+                self._costs[v.name] = v.cost
+                answer = answers.plan_answer(n, plan, {}, self._units, time.perf_counter() - begun_s)
+                self._send(answer | {"type": "interim", "verdict": answers.verdict_word(True)})
+                return True
+        return False
 
     def _send_plan(self, n: int, plan: Plan, elapsed_s: float) -> None:
         """Send the certificate, then the way home, which is judged before it if the mission requires a safe one."""

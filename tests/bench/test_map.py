@@ -23,7 +23,10 @@ def test_a_short_run_counts_its_paths_and_plans() -> None:
 
 def test_figures_without_an_answer_are_said_to_be_not_measured() -> None:
     nothing = {
-        f"{name}_p{q}{end}": None for name in ("path", "plan") for q in (50, 90) for end in ("_ms", "_processor_ms")
+        f"{name}_p{q}{end}": None
+        for name in ("path", "verdict", "plan")
+        for q in (50, 90)
+        for end in ("_ms", "_processor_ms")
     }
     text = bench.report({"degree": {"paths": 0, "refused": 9, "plans": 0, **nothing}})
     assert "pointer to path not measured" in text

@@ -67,8 +67,8 @@ def mission_with_zones(count: int) -> str:
 
 
 def dragged(page: Browser, folder: Path, places: int = PLACES) -> dict[str, list[float]]:
-    """Milliseconds by name: ``path`` (pointer to path), ``plan`` (in the server), ``judged`` (release to verdict),
-    ``frames`` and ``empty`` (two frames, with the mission and on an empty map)."""
+    """Milliseconds by name: ``path`` (pointer to path), ``plan`` (in the server), ``judged`` (release to verdict), ``whole``
+    (release to the end of the search), ``frames`` and ``empty`` (two frames, with the mission and on an empty map)."""
     file = folder / "zones.yaml"
     file.write_text(mission_with_zones(ZONES), encoding="utf-8")
     page.ask("Page.addScriptToEvaluateOnNewDocument", source=LISTEN)
@@ -95,6 +95,8 @@ def dragged(page: Browser, folder: Path, places: int = PLACES) -> dict[str, list
         begun = time.perf_counter()
         hand.until("document.querySelector('#verdict:not(.unjudged)')")
         found["judged"] = [1e3 * (time.perf_counter() - begun)]
+        hand.judged()
+        found["whole"] = [1e3 * (time.perf_counter() - begun)]
         assert page.complaints() == []
     assert Planner(file).mission["vehicles"][0]["goal"] == load_mission(file).content.given["vehicles"][0]["goal"]  # type: ignore[union-attr]
     return found

@@ -57,8 +57,9 @@ class Hand:
         return f"{words} | {self.page.complaints()}"
 
     def judged(self) -> None:
-        """Wait until the path is judged and safe, whatever its way home."""
-        self.until("document.querySelector('#verdict strong')?.textContent.endsWith('safe')")
+        """Wait until the search has ended and the path is judged and safe, whatever its way home."""
+        safe = "document.querySelector('#verdict strong')?.textContent.endsWith('safe')"
+        self.until(f"{safe} && document.getElementById('gap').hidden")
 
     def at(self, selector: str) -> tuple[float, float]:
         """The middle of an element in the window."""

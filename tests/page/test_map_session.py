@@ -13,6 +13,7 @@ import yaml
 
 from gcsplan.app.fleet.pipeline import load_mission, plan
 from gcsplan.errors import InputError
+from gcsplan.page.answers import flown_line
 from gcsplan.page.edits import Edits
 from gcsplan.page.map_session import MapSession
 from gcsplan.page.steps.flight_steps import PageSteps
@@ -76,6 +77,24 @@ def test_a_drop_is_one_step_that_undo_takes_back_and_redo_makes(desk: Desk) -> N
     state = desk.ask("undo", "state")
     assert (state["undo"], state["redo"], state["saved"]) == (False, True, True)
     assert desk.ask("redo", "state")["vehicles"][0]["goal"] == [46.513, 8.51]
+
+
+@pytest.mark.slow
+def test_after_a_drop_the_path_of_the_drag_is_judged_before_the_search(desk: Desk, file: Path) -> None:
+    desk.ask("hello", "plan")
+    desk.ask("change", "path", changes={GOAL: [46.512, 8.51]}, live=True)
+    first = desk.ask("change", "interim", changes={GOAL: [46.512, 8.51]})
+    assert (first["verdict"], first["vehicles"][0]["verdict"], "plan" in first) == ("safe", "safe", False)
+    heard = len(desk.heard)
+    found = desk.until("plan")
+    assert {a["type"] for a in desk.heard[heard:]} <= {"bound", "plan"}  # no path that is not judged replaces it
+    mission = yaml.safe_load(file.read_text(encoding="utf-8"))
+    mission["vehicles"][0]["goal"] = [46.512, 8.51]
+    [own] = plan(mission).vehicles
+    assert (found["vehicles"][0]["line"], found["vehicles"][0]["bound"]) == (
+        flown_line(own.verdict),
+        own.solution.lower_bound,
+    )
 
 
 @pytest.mark.slow

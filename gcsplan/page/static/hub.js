@@ -11,7 +11,7 @@ export function tell(kind, value) {
   for (const call of listeners.get(kind) || []) call(value);
 }
 
-const ANSWERS = new Set(['path', 'bound', 'plan', 'home', 'refused', 'scene']);
+const ANSWERS = new Set(['path', 'bound', 'interim', 'plan', 'home', 'refused', 'scene']);
 
 // Takes a message of the server; an answer to what has been changed since is left out.
 export function take(message) {

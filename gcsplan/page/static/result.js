@@ -20,13 +20,14 @@ export function startResult() {
   on('path', path);
   on('bound', (message) => showGap(message.gap_percent));
   on('plan', plan);
+  on('interim', interim);
   on('home', home);
   on('refused', refused);
   on('asked', () => { current = null; found = new Set(); planning(); });
   on('dragged', (changes) => { if (current) { agePath(moved(changes)); follows(); } });
   on('error', (message) => {
     if (message.code === 'bad_mission') nothing(message.message, 'The mission has a mistake');
-    if (['bad_change', 'bad_file', 'bad_text', 'file_exists'].includes(message.code)) for (const answer of before) ({ plan, home, refused })[answer.type](answer);
+    if (['bad_change', 'bad_file', 'bad_text', 'file_exists'].includes(message.code)) for (const answer of before) ({ plan, home, refused, interim })[answer.type](answer);
   });
   on('connection', (now) => { if (now !== 'open') nothing('The result below may be old.', 'Not connected'); });
   on('state', (state) => {
@@ -116,6 +117,12 @@ function details(message) {
   rest.classList.remove('old');
   rest.replaceChildren(...message.vehicles.filter((v) => few || v.vehicle === shown || v.verdict !== 'safe').flatMap((v) => ofVehicle(v, several)),
     ...[list('Left out', message.left_out.map((l) => `${l.name}: ${l.message}`), true), list('Notes on all', message.notes, false)].filter((p) => p));
+}
+
+// The path of the drag, judged: the search goes on.
+function interim(message) {
+  plan(message);
+  showGap(message.vehicles[0].gap_percent);
 }
 
 // A mission is called safe with all its returns; before they are judged, or where one is unsafe, its path alone is.
