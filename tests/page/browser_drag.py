@@ -67,8 +67,9 @@ def mission_with_zones(count: int) -> str:
 
 
 def dragged(page: Browser, folder: Path, places: int = PLACES) -> dict[str, list[float]]:
-    """Milliseconds by name: ``path`` (pointer to path), ``plan`` (in the server), ``judged`` (release to verdict), ``whole``
-    (release to the end of the search), ``frames`` and ``empty`` (two frames, with the mission and on an empty map)."""
+    """Milliseconds by name: ``path`` (pointer to path), ``plan`` (in the server), ``judged`` (release to verdict),
+    ``whole`` (release to the end of the search), ``frames`` and ``empty`` (two frames, with the mission and on an empty
+    map)."""
     file = folder / "zones.yaml"
     file.write_text(mission_with_zones(ZONES), encoding="utf-8")
     page.ask("Page.addScriptToEvaluateOnNewDocument", source=LISTEN)

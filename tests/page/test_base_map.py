@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import gzip
 import random
 import sqlite3
+import time
 from pathlib import Path
 
 import pytest
@@ -59,6 +61,83 @@ def test_no_broken_pmtiles_file_ends_the_page(tmp_path: Path) -> None:
         except InputError:
             refused += 1
     assert min(served, refused) > 5
+
+
+def packed(*entries: int) -> bytes:
+    """A directory of a PMTiles file: its numbers, seven bits a byte."""
+    out = bytearray()
+    for number in entries:
+        while number > 0x7F:
+            out.append(number & 0x7F | 0x80)
+            number >>= 7
+        out.append(number)
+    return gzip.compress(bytes(out))
+
+
+LEAF_OF_ITSELF = packed(1, 0, 0, 60, 1)
+"""Of all tiles, the entries lie in a directory of 60 bytes where the leaves begin."""
+
+
+@pytest.mark.parametrize(
+    "root",
+    [
+        gzip.compress(bytes(2**21)), gzip.compress(bytes(2**20 - 9)) * 2, gzip.compress(b"\xff" * 2**19),
+        packed(2**60), packed(1, 0, 1, 2**62, 1), packed(1, 0, 1, 7, 2**63), packed(1, 0, 1, 7, 0), LEAF_OF_ITSELF,
+    ],
+    ids=["bomb", "two members", "long number", "many", "large", "far", "before the file", "deep"],
+)  # fmt: skip
+def test_a_hostile_directory_of_a_pmtiles_file_holds_no_tile(tmp_path: Path, root: bytes) -> None:
+    file = pmtiles(tmp_path / "a.pmtiles")
+    data = file.read_bytes()
+    header = bytearray(data[:127])
+    for at, number in ((8, len(data)), (16, len(root)), (40, len(data))):
+        header[at : at + 8] = number.to_bytes(8, "little")
+    file.write_bytes(bytes(header) + data[127:] + root)
+    begun_s = time.process_time()
+    assert not BaseMap(str(file)).tile(3, 4, 2)
+    assert time.process_time() - begun_s < 1.0
+
+
+@pytest.mark.parametrize("about", [b"[" * 100_000, b"{" + b" " * 2**21 + b"}"], ids=["deep", "large"])
+def test_hostile_metadata_of_a_pmtiles_file_is_bad_input(tmp_path: Path, about: bytes) -> None:
+    file = pmtiles(tmp_path / "a.pmtiles")
+    data, about = file.read_bytes(), gzip.compress(about)
+    header = bytearray(data[:127])
+    for at, number in ((24, len(data)), (32, len(about))):
+        header[at : at + 8] = number.to_bytes(8, "little")
+    file.write_bytes(bytes(header) + data[127:] + about)
+    with pytest.raises(InputError, match="no PMTiles file"):
+        BaseMap(str(file))
+
+
+def changed(file: Path, *statements: str) -> Path:
+    with sqlite3.connect(file) as made:
+        for statement in statements:
+            made.execute(statement)
+    made.close()
+    return file
+
+
+def test_a_value_of_an_mbtiles_file_that_is_too_large_is_no_tile(tmp_path: Path) -> None:
+    file = changed(mbtiles(tmp_path / "a.mbtiles"), "UPDATE tiles SET tile_data = zeroblob(5000000)")
+    assert BaseMap(str(file)).tile(3, 4, 2) is None
+
+
+@pytest.mark.parametrize("zoom", ["'top'", "-1", "99", "1e400", "x'00'"])
+def test_zooms_that_are_none_are_bad_input(tmp_path: Path, zoom: str) -> None:
+    file = changed(mbtiles(tmp_path / "a.mbtiles"), f"UPDATE tiles SET zoom_level = {zoom}")
+    with pytest.raises(InputError, match="zooms from"):
+        BaseMap(str(file))
+
+
+@pytest.mark.nightly
+@pytest.mark.slow
+def test_an_mbtiles_file_that_never_answers_is_bad_input(tmp_path: Path) -> None:
+    numbers = "WITH RECURSIVE n(i) AS (SELECT 0 UNION ALL SELECT i + 1 FROM n)"
+    view = f"CREATE VIEW tiles AS {numbers} SELECT i AS zoom_level, 0 AS tile_column, 0 AS tile_row FROM n"
+    file = changed(mbtiles(tmp_path / "a.mbtiles"), "DROP TABLE tiles", view)
+    with pytest.raises(InputError, match="does not answer within 5 s"):
+        BaseMap(str(file))
 
 
 def test_rows_of_a_file_count_from_the_south(tmp_path: Path) -> None:
