@@ -6,6 +6,7 @@ every key of it; the few that only the text of the mission can change are shown 
 
 from __future__ import annotations
 
+import json
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -282,6 +283,12 @@ def require_changes(changes: object) -> Mapping[str, object]:
     for place, value in changes.items():
         if not (is_crew_key(place, value) or _may_change(place, value)):
             raise PageError("this key cannot be changed on the page", code="bad_change", where=place[:80])
+        try:
+            json.dumps(value, ensure_ascii=False, default=str).encode()
+        except UnicodeEncodeError as why:
+            half = ascii(why.object[why.start])
+            words = f"the text has {half}, half of a character, which no file holds: delete it and type the text anew"
+            raise PageError(words, code="bad_change", where=place[:80]) from None
     return changes
 
 

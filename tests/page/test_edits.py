@@ -59,6 +59,13 @@ def test_the_page_changes_nothing_else(place: str) -> None:
         require_changes({place: 1})
 
 
+@pytest.mark.parametrize("value", ["north \ud83d", {"center": [46.5, 8.5], "radius_m": 50, "name": "\udc00"}])
+def test_half_of_a_character_is_refused_at_its_key(value: object) -> None:
+    with pytest.raises(PageError, match=r"has '\\ud(83d|c00)', half of a character") as refused:
+        require_changes({"no_fly[3].name" if isinstance(value, str) else "no_fly[3]": value})
+    assert refused.value.problems[0].where.startswith("no_fly[3]")
+
+
 def test_a_cure_is_set_where_the_mission_has_the_limit() -> None:
     document = {"limits": {"max_agl_ft": 100}, "vehicles": [{"name": "a"}, {"name": "b", "max_amsl_m": 900}]}
     assert cure_changes(document, "a", (("max_agl_m", 60.96),)) == {"limits.max_agl_ft": 200.0}
