@@ -125,6 +125,7 @@ class MapSession:
         self._shows_scene = False
         self._revision = 0
         self._tiles: GroundTiles | None = None
+        self._older: dict[int, GroundTiles | None] = {}  # of the revision before, which a page may still request
         self._tiles_of: Any = None
         self._disk = edits.store.disk()
         self._unkept = False
@@ -156,14 +157,17 @@ class MapSession:
             planner.cancel()
 
     def tile(self, revision: int, z: int, x: int, y: int) -> bytes | None:
-        """A terrain tile; None if there is none, or another terrain by now."""
-        tiles = self._tiles
-        return None if tiles is None or revision != self._revision else tiles.png(z, x, y)
+        """A terrain tile; None if there is none, or other terrains by now."""
+        tiles = self._tiles_of_revision(revision)
+        return None if tiles is None else tiles.png(z, x, y)
 
     def contours(self, revision: int, z: int, x: int, y: int) -> bytes | None:
         """The contours of a terrain tile as GeoJSON, in the page's units; None as for `tile`."""
-        tiles = self._tiles
-        return None if tiles is None or revision != self._revision else tiles.contours(z, x, y, self._units.height)
+        tiles = self._tiles_of_revision(revision)
+        return None if tiles is None else tiles.contours(z, x, y, self._units.height)
+
+    def _tiles_of_revision(self, revision: int) -> GroundTiles | None:
+        return self._older.get(revision, self._tiles if revision == self._revision else None)
 
     def close(self) -> Path | None:
         """End the session; the file in which unsaved edits are kept, None if all are saved. Raises InputError."""
@@ -495,6 +499,7 @@ class MapSession:
         named = section, None if frame is None else (frame.lat_deg, frame.lon_deg)
         if named == self._tiles_of:
             return
+        self._older = {self._revision: self._tiles}
         self._revision += 1
         self._tiles_of = named
         self._tiles = None

@@ -8,6 +8,7 @@ from __future__ import annotations
 import asyncio
 import errno
 import json
+import logging
 import socket
 import threading
 from collections.abc import Mapping
@@ -126,7 +127,12 @@ class MapServer:
         self._thread.join()
 
     def _run(self) -> None:
-        asyncio.run(self._serve())
+        log = logging.getLogger("uvicorn.error")
+        log.addFilter(self._is_news)
+        try:
+            asyncio.run(self._serve())
+        finally:
+            log.removeFilter(self._is_news)
 
     async def _serve(self) -> None:
         # Signals stay with the main thread: uvicorn would take them only there.
@@ -135,6 +141,10 @@ class MapServer:
             await self._server.serve(sockets=[self._socket])
         finally:
             hurrying.cancel()
+
+    def _is_news(self, _: logging.LogRecord) -> bool:
+        """Whether a line of the log is shown: requests that the end breaks off are none."""
+        return not self._server.should_exit
 
     async def _hurry(self) -> None:
         while True:

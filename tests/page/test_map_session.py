@@ -98,6 +98,17 @@ def test_after_a_drop_the_path_of_the_drag_is_judged_before_the_search(desk: Des
 
 
 @pytest.mark.slow
+def test_tiles_of_the_terrain_before_are_there_for_a_page_that_still_requests_them(desk: Desk) -> None:
+    place = 9, 268, 181
+    revision = int(desk.ask("hello", "state")["terrain"]["tiles"].split("/")[1])
+    for k in range(1, 3):
+        assert desk.session.tile(revision, *place) is not None
+        desk.ask("change", "state", changes={"terrain.flat_m": 100 + k})
+    assert desk.session.tile(revision, *place) is None
+    assert desk.session.tile(revision + 2, *place) is not None
+
+
+@pytest.mark.slow
 def test_a_drop_behind_a_drag_is_planned_without_the_path_of_the_drag(desk: Desk) -> None:
     desk.ask("hello", "home")
     heard: queue.Queue[dict[str, Any]] = queue.Queue()

@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import os
 import socket
+import threading
+import time
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -21,7 +23,8 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from gcsplan.errors import UsageError
 from gcsplan.page.guard import PageAddress
-from gcsplan.page.server import MapServer
+from gcsplan.page.map_session import MapSession
+from gcsplan.page.server import LEAVE_S, MapServer
 from tests.page.talk import FLAT, Page, get, raw, serving
 
 pytestmark = pytest.mark.xdist_group("map")
@@ -292,3 +295,25 @@ def test_a_dropped_file_is_read_when_the_page_looks_and_not_before(server: MapSe
         page.send("inspect")
         found = page.until("dropped")
     assert (found["name"], found["kind"], bool(found["error"])) == ("broken_zones.kml", "zones", True)
+
+
+@pytest.mark.slow
+@pytest.mark.nightly
+def test_an_end_while_tiles_are_made_prints_nothing(
+    file: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    begun = threading.Event()
+
+    def slow(*_: int) -> None:
+        begun.set()
+        time.sleep(2.0 * LEAVE_S)
+
+    monkeypatch.setattr(MapSession, "tile", slow)
+    with serving(file, file.parent) as server:
+        path, host = server.url.removeprefix("http://").split("/", 1)[1], f"127.0.0.1:{server.port}"
+        request = f"GET /{path}terrain/1/9/0/0.png HTTP/1.1\r\nHost: {host}\r\n\r\n".encode()
+        asking = threading.Thread(target=raw, args=(server, request))
+        asking.start()
+        assert begun.wait(10.0)
+    asking.join()
+    assert caplog.records == []

@@ -69,7 +69,7 @@ function showGap(percent) {
   made.hidden = percent === null || percent === undefined;
   if (made.hidden) return;
   const text = `No path is more than ${num(percent, percent < 0.095 ? 2 : 1)}${'\u202f'}% shorter`;
-  made.replaceChildren(el('span', {}, text), el('meter', { min: 0, max: 20, low: 1, value: Math.min(20, percent), 'aria-label': 'Gap, percent' }));
+  made.replaceChildren(el('span', {}, text), el('meter', { min: 0, max: 20, low: 1, optimum: 0, value: Math.min(20, percent), 'aria-label': 'Gap, percent' }));
 }
 
 function follows() {
