@@ -37,20 +37,11 @@ DATABASE_S = 5.0
 
 _ADDRESS = re.compile(r"(https?://[A-Za-z0-9.-]+(?::\d+)?)/[^\s'\";,]*")
 _BROKEN_PMTILES = (
-    MagicNumberNotFound,
-    SpecVersionUnsupported,
-    ValueError,
-    OSError,
-    EOFError,
-    IndexError,
-    KeyError,
-    OverflowError,
-    TypeError,
-    RecursionError,
-    zlib.error,
-)
+    MagicNumberNotFound, SpecVersionUnsupported, ValueError, OSError, EOFError, IndexError, KeyError, OverflowError,
+    TypeError, RecursionError, zlib.error,
+)  # fmt: skip
+_LONG_NUMBER = re.compile(rb"[\x80-\xff]{10}")
 _ABOUT = "SELECT name, substr(value, 1, 1000) FROM metadata WHERE name IN ('format', 'attribution') LIMIT 2"
-_LONG_NUMBER = re.compile(rb"[\x80-\xff]{10}")  # fmt: skip
 
 
 BASE_FORMS = "an .mbtiles or .pmtiles file, or an address with {z}, {x} and {y}"
@@ -77,8 +68,8 @@ class MbtilesFile:
                 known = {str(k): str(v) for k, v in opened.execute(_ABOUT)}
                 low, high = opened.execute("SELECT min(zoom_level), max(zoom_level) FROM tiles").fetchone()
         except sqlite3.Error as why:
-            late = f"it does not answer within {DATABASE_S:g} s"
-            words = late if why.sqlite_errorname == "SQLITE_INTERRUPT" else f"this is no MBTiles file: {why}"
+            late = getattr(why, "sqlite_errorcode", None) == sqlite3.SQLITE_INTERRUPT
+            words = f"it does not answer within {DATABASE_S:g} s" if late else f"this is no MBTiles file: {why}"
             raise InputError(words, where=f"--base {file}") from None
         self.media_type = FORMATS.get(known.get("format", ""), "")
         if not self.media_type or low is None:
@@ -178,9 +169,8 @@ class BaseMap:
         self._file = kind(file)
         self.media_type, (low, high) = self._file.media_type, self._file.zooms
         if not (isinstance(low, int) and isinstance(high, int) and 0 <= low <= high <= MOST_BASE_ZOOM):
-            words = (
-                f"it has zooms from {str(low)[:20]} to {str(high)[:20]}: give tiles of zooms from 0 to {MOST_BASE_ZOOM}"
-            )
+            found = f"{str(low)[:20]} to {str(high)[:20]}"
+            words = f"it has zooms from {found}: give tiles of zooms from 0 to {MOST_BASE_ZOOM}"
             raise InputError(words, where=f"--base {file}")
         attribution = re.sub(r"<[^>]*>", "", self._file.attribution)[:300]
         self._about = {"tiles": "base/{z}/{x}/{y}", "minzoom": low, "maxzoom": high, "attribution": attribution}

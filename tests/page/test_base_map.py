@@ -123,6 +123,12 @@ def test_a_value_of_an_mbtiles_file_that_is_too_large_is_no_tile(tmp_path: Path)
     assert BaseMap(str(file)).tile(3, 4, 2) is None
 
 
+def test_words_of_an_mbtiles_file_that_are_no_text_are_bad_input(tmp_path: Path) -> None:
+    file = changed(mbtiles(tmp_path / "a.mbtiles"), "UPDATE metadata SET value = CAST(x'ff' AS TEXT)")
+    with pytest.raises(InputError, match="no MBTiles file"):
+        BaseMap(str(file))
+
+
 @pytest.mark.parametrize("zoom", ["'top'", "-1", "99", "1e400", "x'00'"])
 def test_zooms_that_are_none_are_bad_input(tmp_path: Path, zoom: str) -> None:
     file = changed(mbtiles(tmp_path / "a.mbtiles"), f"UPDATE tiles SET zoom_level = {zoom}")

@@ -45,7 +45,8 @@ class KnownTrack(Search):
         for kept in (known[1:-1], known[moved]):
             points, pinned = through_places(problem, kept)
             if broken := judge.violations(points):
-                found = redrawn(problem, points, pinned, (broken[0][0], broken[-1][0]))
+                legs = [leg for leg, _ in broken]
+                found = redrawn(problem, points, pinned, (min(legs), max(legs)))
                 if found is None or judge.violations(found[0]):
                     continue
                 points, pinned = found
