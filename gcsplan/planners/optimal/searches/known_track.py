@@ -19,7 +19,7 @@ from gcsplan.planners.profile.track import Flown, fly, make_track
 KNOWN_S = 2.05e-3
 """Counted seconds of the path: a little more than of the straight one, which goes first, and less than of all else."""
 
-SAME_PLACE_M = 0.05
+AT_OLD_END_M = 0.05
 """An end of the known path that lies so near to an end as it is now has not moved, m."""
 
 
@@ -41,7 +41,7 @@ class KnownTrack(Search):
         pass get another profile; way points that are no longer needed go."""
         problem, judge, known = self.problem, self.incumbent.judge, self.problem.known
         assert known is not None
-        moved = np.linalg.norm(known[:, None] - [problem.start, problem.goal], axis=-1).min(axis=1) > SAME_PLACE_M
+        moved = np.linalg.norm(known[:, None] - [problem.start, problem.goal], axis=-1).min(axis=1) > AT_OLD_END_M
         for kept in (known[1:-1], known[moved]):
             points, pinned = through_places(problem, kept)
             if broken := judge.violations(points):
