@@ -27,6 +27,7 @@ from gcsplan.mission_file.values import schema
 from gcsplan.planners import registry
 from gcsplan.sim.vehicle.firmware import FIRMWARE_CHANGES, KNOWN_FIRMWARE
 from gcsplan.world.airspace import ViolationKind
+from gcsplan.world.terrain.input_files import FENCE_ZONES, OPENAIR_ZONES, ZONE_FILES
 from tests.support.paths import REPOSITORY
 
 TOP = REPOSITORY
@@ -162,6 +163,11 @@ def test_the_contract_names_every_key_of_the_summary_and_every_kind_of_violation
         assert f'"{key}"' in text, key
     for kind in (*get_args(ViolationKind), "battery", "refused", "unreachable", "too_many_items"):
         assert f"`{kind}`" in text, kind
+
+
+def test_every_ending_of_files_of_zones_stands_where_users_look_it_up() -> None:
+    pages = "".join((DOCS / "how-to" / page).read_text(encoding="utf-8") for page in ("zones.md", "airspace.md"))
+    assert [e for e in (*ZONE_FILES, *FENCE_ZONES, *OPENAIR_ZONES) if f"`{e}`" not in pages] == []
 
 
 @pytest.mark.nightly
