@@ -31,7 +31,7 @@ from gcsplan.errors import InputError
 from gcsplan.planners.problem import Problem
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.geometry.limits import Limits
-from gcsplan.world.kernels.compiled import UNIT
+from gcsplan.world.kernels.compiled import WORLD_UNIT
 from gcsplan.world.kernels.entries import judge
 from gcsplan.world.kernels.field import Field
 from gcsplan.world.kernels.neighbourhood import extrema_around
@@ -293,6 +293,6 @@ def _compiled(types: tuple[Any, ...]) -> Any:
             "        return self.ok[0]",
         ]
     )
-    scope = {"judge": UNIT.with_numba()["judge"]}
+    scope = {"judge": WORLD_UNIT.with_numba()["judge"]}
     exec(source, scope)
     return jitclass(list(zip(KERNEL_ARGUMENTS, types, strict=True)))(scope["OneLeg"])
