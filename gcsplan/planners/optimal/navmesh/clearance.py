@@ -122,6 +122,10 @@ class ClearanceGrid:
         self._zones, self._edges = plane.zones(low, spec.under, spec.over)
         self._boxes = plane.boxes(self.row, self.col, fineness, rows, cols)
         self._coarse, self._steep, self._exact_m = (ground, x, y), steep, exact_m
+        self._lids = np.empty((0, 0))
+        if low and limits.max_agl_m is not None:
+            over_m = limits.max_agl_m - limits.altitude_error_m + plane.fit.spare_m
+            self._lids = highest_of_cells(plane.grounds[1][nodes]) + over_m
         self._up, self._down = (self._array(name, self.shape) for name in ("up", "down"))
         self._of = self._array("of", (self._diagonal.size,), np.int32)
         self._of_zones = (plane.shapes.cells + low * plane.shapes.looking) * fineness**2
@@ -315,8 +319,9 @@ class ClearanceGrid:
         spend, read = self.plane.problem.budget.spend, np.zeros(1, np.int64)
         count = stamp_zones(
             self._around, self._span, self._excess, self._floor, self._ground, *self._coarse, self._steep,
-            self.fineness, reach_m, -1.0 if self._exact_m is None else self._exact_m, reach_m * PLACES, read, self._up,
-            self._down, self._x, self._y, self._zones, self._edges, self._boxes, self.low, self._of, self._values,
+            self._lids, self.fineness, reach_m, -1.0 if self._exact_m is None else self._exact_m, reach_m * PLACES,
+            read, self._up, self._down, self._x, self._y, self._zones, self._edges, self._boxes, self.low, self._of,
+            self._values,
         )  # fmt: skip
         spend("read", float(read[0]))
         if self.low and self.plane.stride == 1:
@@ -344,6 +349,13 @@ class ClearanceGrid:
         own = self._array("own", (int(end[-1]) if len(end) else 0, 4), np.int32)
         own[:] = -2
         return own, np.append(0, end[:-1]), np.zeros(1, np.int64)
+
+
+def highest_of_cells(heights: Floats) -> Floats:
+    """(rows - 1, cols - 1) the highest of ``heights`` (rows, cols) at each cell's corners; inf if one is unknown."""
+    known = np.where(np.isnan(heights), np.inf, heights)
+    rows = np.maximum(known[1:], known[:-1])
+    return np.maximum(rows[:, 1:], rows[:, :-1])
 
 
 def mesh_of(

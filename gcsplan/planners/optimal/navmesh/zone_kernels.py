@@ -288,11 +288,26 @@ def own_level(zones: Floats, z: int, level: int, ground: float) -> float:
 
 
 @device
+def _lid_over(lids: Floats, fineness: int, floor: Floats, excess: Floats, j: int, i: int) -> float:
+    """The highest altitude over a cell by the ``lids`` of a lattice ``fineness`` times coarser, if it is below the cap
+    at all corners; inf if it is not, or if there are no lids."""
+    if not len(lids):
+        return math.inf
+    lid = float(lids[j // fineness, i // fineness])
+    for q in range(4):
+        jj, ii = j + (q >> 1), i + (q & 1)
+        if not lid < floor[jj, ii] - excess[jj, ii]:
+            return math.inf
+    return lid
+
+
+@device
 def _open(
-    zones: Floats, z: int, floors: Floats, excess: Floats, ground: Floats, up: Floats, down: Floats, j: int, i: int
-) -> bool:
-    """Whether an altitude is free at a node: over a zone, under it, or between the two of a pair."""
-    floor, allowed = floors[j, i], floors[j, i] - excess[j, i]
+    zones: Floats, z: int, floors: Floats, excess: Floats, ground: Floats, up: Floats, down: Floats, lid: float, j: int,
+    i: int,
+) -> bool:  # fmt: skip
+    """Whether an altitude up to ``lid`` is free at a node: over a zone, under it, or between the two of a pair."""
+    floor, allowed = floors[j, i], min(floors[j, i] - excess[j, i], lid)
     bottom, top = (
         level_at(zones, z, BOTTOM, ground, up, down, j, i), level_at(zones, z, TOP, ground, up, down, j, i)
     )  # fmt: skip
@@ -316,21 +331,22 @@ def _open(
 
 
 @kernel(
-    "i4[,] i4[,] f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] i8 f8 f8 f8[,] i8[] f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] "
-    "i4[,] b1 i4[] f8[,]"
+    "i4[,] i4[,] f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] i8 f8 f8 f8[,] i8[] f8[,] f8[,] f8[,] f8[,] f8[,] "
+    "f8[,] i4[,] b1 i4[] f8[,]"
 )
 def stamp_zones(
     around: Int32s, span: Int32s, excess: Floats, floor: Floats, ground: Floats, coarse: Floats, coarse_x: Floats,
-    coarse_y: Floats, steep: Floats, fineness: int, reach: float, exact: float, disc: Floats, read: Int64s, up: Floats,
-    down: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, boxes: Int32s, low: bool, of: Int32s,
-    values: Floats,
+    coarse_y: Floats, steep: Floats, lids: Floats, fineness: int, reach: float, exact: float, disc: Floats,
+    read: Int64s, up: Floats, down: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, boxes: Int32s,
+    low: bool, of: Int32s, values: Floats,
 ) -> int:  # fmt: skip
     """Give the cells that zones shut walls of their own; return how many walls there are.
 
     A wall's values are how deep the cell's corners lie in the shape, or how far its top is above the allowed height, m.
     ``zones`` (Z, NUMBERS); ``boxes`` (Z, 4): first and last column, first and last row of the cells each may touch;
     ``around``, ``span``, ``of``, ``values``: as in `mesh_kernels`. ``low``: only cells that are certainly shut; else
-    all cells that may be shut.
+    all cells that may be shut. ``lids``: the highest altitudes over the cells of a lattice ``fineness`` times coarser,
+    where no path is higher; none for (0, 0).
 
     For paths, ground within ``reach`` decides levels of datum `BESIDE`. How far it rises and falls at each node
     (``up``, ``down``: work arrays) is guessed from ``steep``, the slopes at the nodes of a lattice ``fineness`` times
@@ -352,28 +368,28 @@ def stamp_zones(
         west = east = north_west = north_east = 0.0
         west_open = east_open = north_west_open = north_east_open = False
         for j in range(boxes[z, 2], boxes[z, 3] + 1):
-            before = -2
+            before, lid_before = -2, math.inf
             for i in range(max(boxes[z, 0], span[j, 0]), min(boxes[z, 1] + 1, span[j, 1])):
                 cell = j * (excess.shape[1] - 1) + i
                 if min(min(excess[j, i], excess[j, i + 1]), min(excess[j + 1, i], excess[j + 1, i + 1])) > 0.0:
                     continue  # nothing there is free anyway
                 read[0] += STAMPED
                 under = zones[z, UNDER] > 0.0
-                first = 0
-                if before == i - 1:  # the western nodes are the eastern ones of the cell before
+                first, lid = 0, _lid_over(lids, fineness, floor, excess, j, i)
+                if before == i - 1 and lid == lid_before:  # the western nodes are the eastern ones of the cell before
                     west, north_west = east, north_east
                     west_open, north_west_open = east_open, north_east_open
                     first = 1
                 for q in range(first, 2):
                     south_depth = depth(zones, edges, z, x[j, i + q], y[j, i + q])
                     north_depth = depth(zones, edges, z, x[j + 1, i + q], y[j + 1, i + q])
-                    south_open = _open(zones, z, floor, excess, ground, up, down, j, i + q)
-                    north_open = _open(zones, z, floor, excess, ground, up, down, j + 1, i + q)
+                    south_open = _open(zones, z, floor, excess, ground, up, down, lid, j, i + q)
+                    north_open = _open(zones, z, floor, excess, ground, up, down, lid, j + 1, i + q)
                     if q == 0:
                         west, north_west, west_open, north_west_open = south_depth, north_depth, south_open, north_open
                     else:
                         east, north_east, east_open, north_east_open = south_depth, north_depth, south_open, north_open
-                before = i
+                before, lid_before = i, lid
                 ways = int(west_open) + int(east_open) + int(north_east_open) + int(north_west_open)
                 if ways == 4:
                     continue
@@ -385,13 +401,16 @@ def stamp_zones(
                     twist = _twist(floor, ground, j, i) if zones[z, TOP_AGL] > 0.0 else 0.0
                     for k in range(4):
                         jj, ii = j + (k >> 1), i + ((k ^ (k >> 1)) & 1)
-                        wall[k] = level_at(zones, z, TOP, ground, up, down, jj, ii) - floor[jj, ii] + excess[jj, ii]
+                        top = level_at(zones, z, TOP, ground, up, down, jj, ii)
+                        wall[k] = top - min(floor[jj, ii] - excess[jj, ii], lid)
                         wall[k] += -twist if low else twist
                     count = put(of, values, cell, wall, count)
                     continue
                 if low and ways > 0:
                     if deepest > 0.0 and zones[z, PAIR] == 0.0:
-                        count = _in_part(excess, floor, ground, zones, z, of, values, wall, shallowest, j, i, count)
+                        count = _in_part(
+                            excess, floor, ground, lid, zones, z, of, values, wall, shallowest, j, i, count
+                        )
                     continue
                 if not low:
                     more = _more_between(zones, edges, z, wall, deepest, shallowest, x, y, j, i)
@@ -427,8 +446,8 @@ def _twist(floor: Floats, ground: Floats, j: int, i: int) -> float:
 
 @device
 def _in_part(
-    excess: Floats, floor: Floats, ground: Floats, zones: Floats, z: int, of: Int32s, values: Floats, wall: Floats,
-    least: float, j: int, i: int, count: int,
+    excess: Floats, floor: Floats, ground: Floats, lid: float, zones: Floats, z: int, of: Int32s, values: Floats,
+    wall: Floats, least: float, j: int, i: int, count: int,
 ) -> int:  # fmt: skip
     """Shut the part of a cell that certainly lies in a zone where it can be passed neither over nor under.
 
@@ -446,7 +465,7 @@ def _in_part(
     for k in range(4):
         jj, ii = j + (k >> 1), i + ((k ^ (k >> 1)) & 1)
         g = ground[jj, ii]
-        shut = level(zones, z, TOP, g) - floor[jj, ii] + excess[jj, ii] - spare
+        shut = level(zones, z, TOP, g) - min(floor[jj, ii] - excess[jj, ii], lid) - spare
         if under:
             bottom = level(zones, z, BOTTOM, g)
             shut = min(min(shut, floor[jj, ii] - bottom), level(zones, z, TOP, g) - bottom - zones[z, THIN] - spare)

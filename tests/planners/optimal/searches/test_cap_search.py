@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import pytest
+
 from gcsplan.planners.optimal.searches.cap_search import CapSearch
 from gcsplan.world.geometry.path import Path
-from gcsplan.world.geometry.zones import Circle, Zone
+from gcsplan.world.geometry.zones import Circle, Level, Zone
 from tests.support.planner_worlds import faults
 from tests.support.searches import over_flat, work_of
 
@@ -29,6 +31,16 @@ def test_under_a_maximum_agl_the_length_of_the_track_is_a_bound_and_no_path_is_t
     assert search.incumbent.best is None
     assert search.incumbent.bound >= before
     assert search.incumbent.bound <= 1430.0
+
+
+@pytest.mark.parametrize("ceiling", [Level(130.0, "agl"), Level(130.0, "amsl")])
+def test_under_a_maximum_agl_the_bound_leads_around_a_zone_with_a_higher_ceiling(ceiling: Level) -> None:
+    zone = Zone("disc", DISC.shape, None, ceiling)
+    below, above = (CapSearch(work_of(over_flat(zone, max_agl_m=most))) for most in (120.0, 140.0))
+    below.run()
+    above.run()
+    around_m = below.incumbent.bound - above.incumbent.bound
+    assert 5.0 < around_m < 50.0
 
 
 def test_with_larger_slacks_a_path_is_found_that_is_longer_than_the_shortest_track() -> None:
