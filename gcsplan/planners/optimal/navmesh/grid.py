@@ -22,7 +22,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from gcsplan.arrays import Bools, Floats, Int32s
 from gcsplan.planners.optimal.navmesh.clearance_kernels import lay, pool
-from gcsplan.planners.optimal.navmesh.zone_kernels import PAIR, TOP, TOP_2, UNDER, UNDER_2
+from gcsplan.planners.optimal.navmesh.zone_kernels import BOTTOM, BOTTOM_2, PAIR, TOP, TOP_2, UNDER, UNDER_2
 from gcsplan.planners.optimal.navmesh.zone_shapes import LOOSE, TOUCH_M, Fit, Shapes, make_shapes
 from gcsplan.planners.problem import Problem
 from gcsplan.world.geometry.surface import GridMap
@@ -286,6 +286,9 @@ def lattice(
     shape = tops[0].shape
     block = max(problem.airspace.straight_cells(fit.bent_m) * parts // stride, 1)
     x, y, looked_at = places(surface.grid, col0, row1, shape, parts / stride, block, reach)
+    shapes = make_shapes(problem, x, y, fit)
+    if stride > 1:
+        _raise_floors(shapes, *grounds)
     return Plane(
         problem,
         col0,
@@ -298,6 +301,19 @@ def lattice(
         tops,
         grounds,
         looked_at,
-        make_shapes(problem, x, y, fit),
+        shapes,
         fit,
     )
+
+
+def _raise_floors(shapes: Shapes, low: Floats, high: Floats) -> None:
+    """Raise the floors above ground of shapes for bounds, on a lattice of merged cells: they count from ``low`` ground
+    (rows, cols), and the true ground may be as high as ``high``. A lower floor may shut what is free."""
+    zones = shapes.low[0]
+    apart, bulge = high - low, 0.25 * np.abs(low[1:, 1:] + low[:-1, :-1] - low[1:, :-1] - low[:-1, 1:])
+    for bottom in (BOTTOM, BOTTOM_2):
+        for k in np.flatnonzero(zones[:, bottom + 2] > 0.0):
+            first, last, row, last_row = shapes.boxes[k].tolist()
+            if first <= last and row <= last_row:
+                here = np.s_[row : last_row + 1, first : last + 1]
+                zones[k, bottom] += apart[row : last_row + 2, first : last + 2].max() + bulge[here].max()

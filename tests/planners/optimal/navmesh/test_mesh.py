@@ -314,6 +314,20 @@ def test_cells_made_one_shut_out_nothing_that_passes_the_exact_check(world: str,
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("stride", [2, 3])
+def test_cells_made_one_leave_the_room_below_a_floor_above_ground(stride: int) -> None:
+    surface, limits = terrain(np.random.default_rng(stride), 6.0), LIMITS["errors"]
+    disc = Circle(300.0, 300.0, 2000.0)
+    room_m = 2.0 * limits.altitude_error_m
+    zones = [Zone("below", disc, None, Level(300.0, "amsl")), Zone("above", disc, Level(100.0 + room_m, "agl"), None)]
+    plane = make_plane(problem_of(surface, zones, limits), EVERYWHERE, 1, stride, 6)
+    places = inner(np.random.default_rng(1), 200, plane)
+    ok = legal(plane.problem, places, 400.0)
+    assert free(mesh_of(plane, 400.0, True), places)[ok].all()
+    assert ok.sum() > 20
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("datum", ["amsl", "agl"])
 @pytest.mark.parametrize(("parts", "stride"), [(1, 1), (2, 1), (1, 2)])
 def test_a_zone_is_a_wall_where_the_maximum_agl_lies_below_its_top(parts: int, stride: int, datum: str) -> None:
