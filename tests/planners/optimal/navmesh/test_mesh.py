@@ -337,7 +337,8 @@ def test_a_zone_is_a_wall_where_the_maximum_agl_lies_below_its_top(parts: int, s
     assert limits.max_agl_m is not None
     room_m = limits.max_agl_m - 2.0 * limits.altitude_error_m
     amsl_m = float(np.median(surface.ground_m)) + room_m
-    zone = Zone("all", Circle(300.0, 300.0, 2000.0), None, Level(amsl_m if datum == "amsl" else room_m - 1.0, datum))
+    ceiling = Level(amsl_m, "amsl") if datum == "amsl" else Level(room_m - 1.0, "agl")
+    zone = Zone("all", Circle(300.0, 300.0, 2000.0), None, ceiling)
     plane = make_plane(problem_of(surface, [zone], limits), EVERYWHERE, parts, stride, stride)
     places = inner(rng, 200, plane)
     spare_m = surface.ground_at(*places.T) + room_m - amsl_m if datum == "amsl" else np.ones(200)
