@@ -18,7 +18,6 @@ from gcsplan.world.airspace import Airspace
 from gcsplan.world.geometry.limits import Limits
 from gcsplan.world.geometry.outlines import few_corners
 from gcsplan.world.geometry.path import runs_m
-from gcsplan.world.geometry.surface import Surface
 from gcsplan.world.geometry.zones import Circle, Zone
 
 SIDE_PIECES = 8
@@ -102,9 +101,9 @@ def margin_for(problem: Problem, cost: float) -> float:
 def border(problem: Problem) -> tuple[Floats, float]:
     """(K, 2, 2) lines that every path crosses which leaves the surface where the terrain goes on; and by how many
     metres the true, curved border may bow away from them."""
-    surface = problem.airspace.surface
+    surface, field = problem.airspace.surface, problem.airspace.field
     rows, cols = surface.ground_m.shape
-    keep = np.full(2, _reach_m(problem.airspace, problem.bound_limits)) / _least_step_m(surface)
+    keep = _reach_m(problem.airspace, problem.bound_limits) / np.array([field.step_x, field.step_y])
     if surface.ground_m.size > 4:  # cells, not flat ground
         keep += INSET_CELLS
     c0, r0 = np.minimum(keep, 0.49 * np.array([cols - 1, rows - 1])).tolist()
@@ -144,8 +143,8 @@ def _by_ground(problem: Problem) -> bool:
     at = surface.grid(*np.array(terminals_of(problem)).T)
     cells = np.clip(np.floor(at).astype(int), 0, [cols - 2, rows - 2])
     # Paths keep `reach` away from the border, so a strip of that width and two more cells counts as the border.
-    reach = _reach_m(problem.airspace, limits) / _least_step_m(surface)
-    c, r = (min(math.ceil(v) + 2, n - 1) for v, n in zip(reach, (cols, rows), strict=True))
+    reach_m, field = _reach_m(problem.airspace, limits), problem.airspace.field
+    c, r = (min(math.ceil(reach_m / s) + 2, n - 1) for s, n in ((field.step_x, cols), (field.step_y, rows)))
     west, north, east, south = surface.goes_on
     sides = [parts[:, :c] if west else parts[:, :0], parts[:r] if north else parts[:0]]
     sides += [parts[:, -c:] if east else parts[:, :0], parts[-r:] if south else parts[:0]]
@@ -203,13 +202,6 @@ def _shape(zone: Zone, reach_m: float) -> Any:
 def _reach_m(air: Airspace, limits: Limits) -> float:
     """Metres that paths keep from unknown ground, with one percent and `ENCLOSING_SHRUNK_M` added."""
     return air.beside_m(limits) * 1.01 + ENCLOSING_SHRUNK_M
-
-
-def _least_step_m(surface: Surface) -> Floats:
-    """(2,) the shortest column step and row step of a surface, metres; a lower bound."""
-    rows, cols = surface.ground_m.shape
-    at = surface.grid.to_plane([0, cols - 1, 0, cols - 1], [0, 0, rows - 1, rows - 1])
-    return np.asarray(0.999 * np.min([surface.grid.metres_per_cell(*p) for p in at.tolist()], axis=0))
 
 
 def _past(a: Floats, b: Floats, lines: Floats) -> float:

@@ -28,6 +28,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -93,6 +94,7 @@ def leaning_m_s(lean_deg: float | Floats, slope_rad: Floats, amsl_m: Floats) -> 
     return np.asarray(along / np.cos(tilt))
 
 
+@lru_cache(maxsize=256)
 def lean_needed_deg(speed_m_s: float, amsl_m: float | None = None) -> float:
     """The lean, in whole degrees, that level flight at a speed needs at an altitude, at most `LARGEST_LEAN_DEG` + 1.
 

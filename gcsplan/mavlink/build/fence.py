@@ -165,7 +165,7 @@ def _circle_of(item: MissionItem, index: int, frame: Frame) -> tuple[Circle, ...
             f"item {index} of the fence is a circle with a radius of {radius_m:g} m, more than {LARGEST_RADIUS_M:g} m: "
             "use a polygon"
         )
-    circle = near_circle(_corner(item, index), radius_m, frame)
+    circle = near_circle(frame.to_plane(*_corner(item, index)).tolist(), radius_m)
     return () if circle is None else (circle,)
 
 

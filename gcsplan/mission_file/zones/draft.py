@@ -348,7 +348,8 @@ def uniquely_named(drafts: Sequence[ZoneDraft]) -> list[ZoneDraft]:
     for draft in drafts:
         name = one_line(draft.name)
         seen[name] += 1
-        named.append(replace(draft, name=f"{name} #{seen[name]}" if seen[name] > 1 else name))
+        name = f"{name} #{seen[name]}" if seen[name] > 1 else name
+        named.append(draft if name == draft.name else replace(draft, name=name))
     return named
 
 
@@ -370,9 +371,14 @@ def zones_sha256(drafts: Sequence[ZoneDraft]) -> str:
     return found.hexdigest()
 
 
-def _plain(drafts: Sequence[ZoneDraft], frame: Frame) -> dict[int, Polygon]:
-    """The shapes, by the identity of their drafts, of polygons that need no more than to be projected."""
-    found: dict[int, Polygon] = {}
+def _plain(drafts: Sequence[ZoneDraft], frame: Frame) -> dict[int, Circle | Polygon]:
+    """The shapes, by the identity of their drafts, of near zones that need no more than to be projected."""
+    found: dict[int, Circle | Polygon] = {}
+    circles = [(d, d.radius_m) for d in drafts if d.radius_m is not None and not d.local]
+    if circles:
+        places = frame.to_plane(*np.array([d.points[0] for d, _ in circles]).T).tolist()
+        round_ = [(d, near_circle(place, radius_m)) for (d, radius_m), place in zip(circles, places, strict=True)]
+        found = {id(d): circle for d, circle in round_ if circle is not None}
     for great_circles in (False, True):
         some = [
             d
@@ -386,7 +392,8 @@ def _plain(drafts: Sequence[ZoneDraft], frame: Frame) -> dict[int, Polygon]:
 
 def _shapes(draft: ZoneDraft, frame: Frame) -> Sequence[Circle | Polygon]:
     if draft.radius_m is not None:
-        circle = near_circle(draft.points[0], draft.radius_m, frame, local=draft.local)
+        centre = draft.points[0] if draft.local else frame.to_plane(*draft.points[0]).tolist()
+        circle = near_circle(centre, draft.radius_m)
         return [circle] if circle is not None else []
     if draft.buffer_m is not None:
         return near_corridors(draft.points, draft.buffer_m, frame, local=draft.local, great_circles=draft.great_circles)

@@ -117,7 +117,8 @@ def outside_zones(areas: Sequence[KeepIn], *, local: bool) -> tuple[Zone, ...]:
 
 def _parts(draft: ZoneDraft, frame: Frame) -> list[AreaPart]:
     if draft.radius_m is not None:
-        circle = near_circle(draft.points[0], draft.radius_m, frame, local=draft.local)
+        centre = draft.points[0] if draft.local else frame.to_plane(*draft.points[0]).tolist()
+        circle = near_circle(centre, draft.radius_m)
         return [] if circle is None else [AreaPart(_chords(circle))]
     if draft.local:
         return [AreaPart(counter_clockwise(np.asarray(draft.points, float)).vertices)]

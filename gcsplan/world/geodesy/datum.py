@@ -13,10 +13,12 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from pyproj import CRS, Transformer
 from pyproj.crs.datum import Datum  # type: ignore[attr-defined]
 from pyproj.exceptions import ProjError
 
+from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
 from gcsplan.notes.note import Note
 from gcsplan.world.geodesy.frame import Frame
@@ -24,6 +26,9 @@ from gcsplan.world.geodesy.height_unit import BY_FILE, METRE, HeightUnit, unit_o
 
 WORST_SHIFT_M = 30.0
 """A horizontal datum shift less accurate than this, m, is refused: it would move hills by more than a DEM cell."""
+
+_DEGREES = CRS.from_proj4("+proj=longlat +datum=WGS84 +no_defs")
+"""The degrees that every plane is made of."""
 
 # Keys hold only letters and digits.
 _GEOIDS = {"EGM84": "EGM84", "EGM96": "EGM96", "EGM2008": "EGM2008", "AMSL": "AMSL", "MSL": "AMSL"}
@@ -305,22 +310,44 @@ def ways(source: CRS, target: CRS, *, allow_ballpark: bool) -> Transformer:
     return Transformer.from_crs(source, target, always_xy=True, allow_ballpark=allow_ballpark)
 
 
-def plane_to_raster(
-    frame: Frame, horizontal: Any, box: tuple[float, float, float, float], *, where: str
-) -> tuple[Transformer, float]:
-    """One fixed operation (east_m, north_m) -> (x, y) of the raster's CRS, and its accuracy in metres (-1 unknown).
+@dataclass(frozen=True, slots=True)
+class RasterWay:
+    """One fixed operation between the plane and a raster's coordinates, which passes degrees on WGS 84.
+
+    ``accuracy_m``: how well PROJ knows it; -1 unknown.
+    """
+
+    frame: Frame
+    from_degrees: Transformer
+    accuracy_m: float
+
+    def to_raster(self, east_m: ArrayLike, north_m: ArrayLike) -> tuple[Floats, Floats]:
+        """x, y of places in the plane; not finite where the raster's system is not defined."""
+        lat, lon = np.moveaxis(self.frame.to_degrees(east_m, north_m), -1, 0)
+        x, y = self.from_degrees.transform(lon, lat)
+        return np.asarray(x, float), np.asarray(y, float)
+
+    def to_plane(self, x: ArrayLike, y: ArrayLike) -> Floats:
+        """(..., 2) east_m, north_m of a raster's coordinates; not finite beyond the plane."""
+        lon, lat = self.from_degrees.transform(x, y, direction="INVERSE")
+        return self.frame.to_plane(lat, lon)
+
+
+def plane_to_raster(frame: Frame, horizontal: Any, box: tuple[float, float, float, float], *, where: str) -> RasterWay:
+    """The operation from the plane to the raster's CRS. The ways from WGS 84 are searched once for all planes.
 
     PROJ may choose another operation for every point, and a ballpark one (no datum shift at all) if it has nothing
     better. Here the best operation for the middle of ``box`` is used for all points, and never a ballpark one. Raises
     InputError if there is none, or none better than `WORST_SHIFT_M`.
     """
-    middle = (0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3]))
+    lat, lon = frame.to_degrees(0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3])).tolist()
     try:
-        several = ways(frame.crs, horizontal, allow_ballpark=False)
-        x, y = several.transform(*middle)
+        several = ways(_DEGREES, horizontal, allow_ballpark=False)
+        x, y = several.transform(lon, lat)
         if not (np.isfinite(x) and np.isfinite(y)):
             raise ProjError("the mission lies where this coordinate system is not defined")
-        one = several.get_last_used_operation()
+        # The one that changes nothing stands alone, and is not remembered as used.
+        one = several if several.name == "noop" else several.get_last_used_operation()
     except ProjError as why:
         raise InputError(
             f"there is no known way from WGS84 to the raster's coordinate system {horizontal.name!r} "
@@ -334,7 +361,7 @@ def plane_to_raster(
             "raster with the proper grid (gdalwarp -t_srs EPSG:4326)",
             where=where,
         )
-    return one, accuracy_m
+    return RasterWay(frame, one, accuracy_m)
 
 
 def to_wgs84(horizontal: Any, *, where: str) -> Transformer:

@@ -88,12 +88,9 @@ FEW_EDGES = 64
 """So few edges cross too seldom to be counted: great circles meet straight ones three times at most."""
 
 
-def near_circle(centre: Corner, radius_m: float, frame: Frame, *, local: bool = False) -> Circle | None:
-    """The circle around (latitude, longitude), or (east_m, north_m) if ``local``; None if it is too far away.
-
-    ``radius_m`` is at most `LARGEST_RADIUS_M`.
-    """
-    east, north = centre if local else (float(x) for x in frame.to_plane(*centre))
+def near_circle(centre_m: Sequence[float], radius_m: float) -> Circle | None:
+    """The circle around (east_m, north_m); None if it is too far away. ``radius_m`` is at most `LARGEST_RADIUS_M`."""
+    east, north = centre_m
     distance = math.hypot(east, north)
     near = math.isfinite(distance) and distance <= ZONE_FAR_M + radius_m
     return Circle(float(east), float(north), radius_m) if near else None

@@ -8,11 +8,10 @@ used: its "up" is off by d²/2R, 7.8 m at 10 km.
 from __future__ import annotations
 
 import math
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pyproj import CRS, Transformer
+from pyproj import Transformer
 
 from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
@@ -41,10 +40,10 @@ class Frame:
         self.lat_deg = float(lat_deg)
         self.lon_deg = float(lon_deg)
         self.amsl_m = float(amsl_m)
-        self._projection = f"+proj=tmerc +lat_0={self.lat_deg:.15g} +lon_0={self.lon_deg:.15g} +k=1 +x_0=0 +y_0=0"
+        projection = f"+proj=tmerc +lat_0={self.lat_deg:.15g} +lon_0={self.lon_deg:.15g} +k=1 +x_0=0 +y_0=0"
         # The operation that PROJ derives from the two coordinate systems, identical to the last bit, without a search
         # in its database.
-        plane = f"{self._projection} +ellps=WGS84"
+        plane = f"{projection} +ellps=WGS84"
         self._forward = Transformer.from_pipeline(
             f"+proj=pipeline +step +proj=unitconvert +xy_in=deg +xy_out=rad +step {plane}"
         )
@@ -54,11 +53,6 @@ class Frame:
 
     def __reduce__(self) -> tuple[type[Frame], tuple[float, float, float]]:
         return Frame, (self.lat_deg, self.lon_deg, self.amsl_m)
-
-    @cached_property
-    def crs(self) -> CRS:
-        """The plane as a coordinate system, for rasters that have one of their own."""
-        return CRS.from_proj4(f"{self._projection} +datum=WGS84 +units=m")
 
     def to_plane(self, lat_deg: ArrayLike, lon_deg: ArrayLike) -> Floats:
         """(..., 2) east_m, north_m of points in degrees (arrays of equal shape)."""

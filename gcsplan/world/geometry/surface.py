@@ -17,6 +17,7 @@ NO_SIDES: Sides = (False, False, False, False)
 DEGREE = 6
 POWERS = tuple((i, j) for i in range(DEGREE + 1) for j in range(DEGREE + 1 - i))
 _IN_U, _IN_V = np.array(POWERS).T
+_UP_TO = np.arange(DEGREE + 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,8 +93,9 @@ class GridMap:
     def jacobian(self, east_m: float, north_m: float) -> Floats:
         """(2, 2) d(col, row) / d(east_m, north_m) at a point."""
         u, v = (east_m - self.centre[0]) / self.scale_m, (north_m - self.centre[1]) / self.scale_m
-        du = np.array([i * u ** max(i - 1, 0) * v**j for i, j in POWERS]) / self.scale_m
-        dv = np.array([j * u**i * v ** max(j - 1, 0) for i, j in POWERS]) / self.scale_m
+        in_u, in_v = u**_UP_TO, v**_UP_TO
+        du = _IN_U * in_u[np.maximum(_IN_U - 1, 0)] * in_v[_IN_V] / self.scale_m
+        dv = _IN_V * in_u[_IN_U] * in_v[np.maximum(_IN_V - 1, 0)] / self.scale_m
         return np.stack([du @ self.coefficients, dv @ self.coefficients], axis=-1)
 
     def metres_per_cell(self, east_m: float, north_m: float) -> Floats:

@@ -6,10 +6,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.polynomial.polynomial import polyder, polygrid2d
 
 from gcsplan.arrays import Floats
 from gcsplan.world.geometry.surface import DEGREE, POWERS, GridMap
-from gcsplan.world.kernels.shared import steps_of
 
 
 class Field(NamedTuple):
@@ -45,26 +45,31 @@ class Field(NamedTuple):
 def _bounds(grid: GridMap, affine: bool) -> tuple[float, float, float]:
     """``bend``, ``step_x``, ``step_y`` of `Field`, from a lattice over the fitted square."""
     f = np.linspace(-1.0, 1.0, 2 if affine else 33)
-    in_u, in_v = ([a.ravel() ** k for k in range(DEGREE + 1)] for a in np.meshgrid(f, f))
+    square = np.zeros((DEGREE + 1, DEGREE + 1, 2))
+    square[tuple(zip(*POWERS, strict=True))] = grid.coefficients
 
     def derivative(du: int, dv: int) -> Floats:
-        total = np.zeros((len(f) ** 2, 2))
-        for k, (i, j) in enumerate(POWERS):
-            if i >= du and j >= dv:
-                factor = math.perm(i, du) * math.perm(j, dv) / grid.scale_m ** (du + dv)
-                total += factor * (in_u[i - du] * in_v[j - dv])[:, None] * grid.coefficients[k]
-        return total
+        of_both = polyder(polyder(square, du, 1.0 / grid.scale_m), dv, 1.0 / grid.scale_m, axis=1)
+        return polygrid2d(f, f, of_both).reshape(2, -1)
 
-    jacobian = np.stack([derivative(1, 0), derivative(0, 1)], axis=-1)
-    inverse = np.linalg.inv(jacobian)
-    steps = np.array([steps_of(*m) for m in inverse.reshape(-1, 4).tolist()])
+    (a, c), (b, d) = derivative(1, 0), derivative(0, 1)  # of column and row
+    inverse = np.array([d, -b, -c, a]) / (a * d - b * c)
+    # `steps_of` over the whole lattice at once.
+    xx, yy = inverse[0] ** 2 + inverse[2] ** 2, inverse[1] ** 2 + inverse[3] ** 2
+    skew = np.abs(inverse[0] * inverse[1] + inverse[2] * inverse[3])
+    ratio = np.sqrt(xx / yy)
+    step_x, step_y = (math.sqrt(max(float(m.min()), 0.0)) for m in (xx - skew * ratio, yy - skew / ratio))
     if affine:
-        return 0.0, float(steps[:, 0].min()), float(steps[:, 1].min())
+        return 0.0, step_x, step_y
     # A symmetric form has its largest value over two directions where the two are equal.
-    uu, uv, vv = (np.einsum("nij,nj->ni", inverse, derivative(*d)) for d in ((2, 0), (1, 1), (0, 2)))
+    uu, uv, vv = (
+        np.array([inverse[0] * col + inverse[1] * row, inverse[2] * col + inverse[3] * row])
+        for col, row in (derivative(2, 0), derivative(1, 1), derivative(0, 2))
+    )
     turn = np.linspace(0.0, np.pi, 24, endpoint=False)
-    c, s = np.cos(turn)[:, None, None], np.sin(turn)[:, None, None]
-    bend = 1.1 * float(np.linalg.norm(c * c * uu + 2.0 * c * s * uv + s * s * vv, axis=-1).max())
+    form = np.array([np.cos(turn) ** 2, 2.0 * np.cos(turn) * np.sin(turn), np.sin(turn) ** 2])
+    east, north = (form.T @ np.array(parts) for parts in zip(uu, uv, vv, strict=True))
+    bend = 1.1 * float(np.sqrt((east * east + north * north).max()))
     spacing = grid.scale_m * (f[1] - f[0])
     keep = 1.0 - bend * spacing
-    return bend, float(steps[:, 0].min()) * keep, float(steps[:, 1].min()) * keep
+    return bend, step_x * keep, step_y * keep

@@ -12,8 +12,9 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,7 +22,7 @@ from numpy.typing import ArrayLike
 from gcsplan.arrays import Bools, Floats
 from gcsplan.errors import InputError
 from gcsplan.notes.note import Note
-from gcsplan.world.geodesy.datum import VerticalDatum, plane_to_raster, to_wgs84
+from gcsplan.world.geodesy.datum import RasterWay, VerticalDatum, plane_to_raster, to_wgs84
 from gcsplan.world.geodesy.frame import Frame
 from gcsplan.world.geodesy.height_unit import BY_NOBODY, METRE, OF_KEY, HeightUnit
 from gcsplan.world.geometry.surface import NO_SIDES, GridMap, Sides
@@ -74,13 +75,13 @@ class Window:
     goes_on: Sides = NO_SIDES
     low_m: Floats | None = None
 
-    @property
+    @cached_property
     def plane_box(self) -> Box:
         """West, south, east, north of all nodes in the plane, m."""
         rows, cols = self.heights_m.shape
         c, r = np.linspace(0, cols - 1, 33), np.linspace(0, rows - 1, 33)
-        border = np.concatenate([self.grid.to_plane(c, 0), self.grid.to_plane(c, rows - 1),
-                                 self.grid.to_plane(0, r), self.grid.to_plane(cols - 1, r)])  # fmt: skip
+        first, last_col, last_row = np.zeros(33), np.full(33, cols - 1), np.full(33, rows - 1)
+        border = self.grid.to_plane([c, c, first, last_col], [first, last_row, r, r]).reshape(-1, 2)
         low, high = border.min(axis=0), border.max(axis=0)
         return float(low[0]), float(low[1]), float(high[0]), float(high[1])
 
@@ -176,14 +177,14 @@ class Mosaic:
         the box, InputError beyond ``most_cells`` (`MAX_CELLS`), and if the plane cannot be fitted to `FIT_ERROR_M`.
         """
         middle = (0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3]))
-        there, accuracy_m = plane_to_raster(frame, self.crs.horizontal, box, where=self.where)
+        there = plane_to_raster(frame, self.crs.horizontal, box, where=self.where)
         reference = float(frame.to_degrees(*middle)[1])
 
         layout = self._layout(reference)
         tiles = layout.tiles
 
         def exact(east_m: Floats, north_m: Floats) -> tuple[Floats, Floats]:
-            x, y = (np.asarray(a, float) for a in there.transform(east_m, north_m))
+            x, y = there.to_raster(east_m, north_m)
             if not (np.isfinite(x).all() and np.isfinite(y).all()):
                 raise InputError(
                     "the mission reaches beyond the limits of the DEM's coordinate system; gdalwarp the DEM to a "
@@ -238,16 +239,16 @@ class Mosaic:
                 where=self.where,
             )
         heights, notes = read_tiles(parts, c0, r0, c1 - c0, r1 - r0, self.where)
-        if accuracy_m < 0.0:
+        if there.accuracy_m < 0.0:
             notes.append(Note("datum_shift_of_unknown_accuracy", crs=self.crs.horizontal.name))
-        elif accuracy_m > 1.0:
-            notes.append(Note("datum_shift_inaccurate", crs=self.crs.horizontal.name, accuracy_m=accuracy_m))
+        elif there.accuracy_m > 1.0:
+            notes.append(Note("datum_shift_inaccurate", crs=self.crs.horizontal.name, accuracy_m=there.accuracy_m))
         goes_on = (c0 > first_col, r0 > first_row, c1 < last_col, r1 < last_row)
         return Window(heights.high_m, grid, x, y, tuple(notes), goes_on, heights.low_m)
 
     def extent(self, frame: Frame, box: Box) -> Box:
         """West, south, east, north of all tiles in the plane, as far as the plane reaches; ``box`` is the mission's."""
-        there, _ = plane_to_raster(frame, self.crs.horizontal, box, where=self.where)
+        there = plane_to_raster(frame, self.crs.horizontal, box, where=self.where)
         layout = self._layout(float(frame.to_degrees(0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3]))[1]))
         cols = [c for p in layout.tiles for c in (p.col, p.col + p.cols - 1)]
         rows = [r for p in layout.tiles for r in (p.row, p.row + p.raster.rows - 1)]
@@ -342,11 +343,10 @@ def box_lattice(box: Box) -> tuple[Floats, Floats]:
     return e.ravel(), n.ravel()
 
 
-def _plane_box(there: Any, x: Floats, y: Floats) -> Box:
+def _plane_box(there: RasterWay, x: Floats, y: Floats) -> Box:
     """The plane's box around a window with these coordinates of columns and rows."""
     xs, ys = np.meshgrid(x[np.linspace(0, len(x) - 1, 33).astype(int)], y[np.linspace(0, len(y) - 1, 33).astype(int)])
-    back = there.transform(xs.ravel(), ys.ravel(), direction="INVERSE")
-    e, n = (np.asarray(a, float) for a in back)
+    e, n = there.to_plane(xs.ravel(), ys.ravel()).T
     good = np.isfinite(e) & np.isfinite(n)
     return float(e[good].min()), float(n[good].min()), float(e[good].max()), float(n[good].max())
 

@@ -310,7 +310,7 @@ class _RasterTerrain:
             info["geoid_sha256"] = self.geoid.sha256()
         ground = high if window.low_m is None else window.low_m
         rows, cols = ground.shape
-        size = window.grid.metres_per_cell(*(0.5 * np.add(window.plane_box[:2], window.plane_box[2:])))
+        size = window.grid.metres_per_cell(*window.grid.centre)
         info |= {
             "dem_sha256": read_hash,
             "vertical_datum": datum,

@@ -11,8 +11,10 @@ from hypothesis import strategies as st
 from pyproj import CRS, Geod, Proj, Transformer
 
 from gcsplan.errors import InputError
+from gcsplan.world.geodesy.datum import plane_to_raster
 from gcsplan.world.geodesy.frame import FARTHEST_M, Frame, centre_of
 from tests.support.effort import draws
+from tests.support.planes import crs_of
 
 WGS84 = Geod(ellps="WGS84")
 HOME = Frame(36.6, -84.3)
@@ -75,12 +77,12 @@ def test_a_distance_in_the_plane_is_the_real_one_times_at_most_the_scale(
 @given(st.floats(-85.0, 85.0), longitudes, st.floats(100.0, FARTHEST_M))
 def test_scale_at_is_the_largest_scale_of_the_projection_and_hardly_more(lat: float, lon: float, far_m: float) -> None:
     frame = Frame(lat, lon)
-    factors = Proj(frame.crs).get_factors(lon, lat)
+    factors = Proj(crs_of(frame)).get_factors(lon, lat)
     assert factors.meridional_scale == pytest.approx(1.0, abs=1e-9)
     scales = []
     for azimuth in range(0, 360, 30):
         at = frame.to_degrees(far_m * math.sin(math.radians(azimuth)), far_m * math.cos(math.radians(azimuth)))
-        factors = Proj(frame.crs).get_factors(float(at[1]), float(at[0]))
+        factors = Proj(crs_of(frame)).get_factors(float(at[1]), float(at[0]))
         scales += [factors.meridional_scale, factors.parallel_scale]
     assert max(scales) <= frame.scale_at(far_m) + 1e-10
     assert frame.scale_at(far_m) - 1.0 <= 1.03 * (max(scales) - 1.0) + 1e-9
@@ -192,11 +194,32 @@ def test_the_centre_is_near_all_points_even_across_the_antimeridian(
 def test_the_plane_is_what_proj_makes_of_both_coordinate_systems_to_the_last_bit(origin: tuple[float, float]) -> None:
     frame, rng = Frame(*origin), np.random.default_rng(3)
     degrees = CRS.from_epsg(4326)
-    forward = Transformer.from_crs(degrees, frame.crs, always_xy=True)
-    back = Transformer.from_crs(frame.crs, degrees, always_xy=True)
+    forward = Transformer.from_crs(degrees, crs_of(frame), always_xy=True)
+    back = Transformer.from_crs(crs_of(frame), degrees, always_xy=True)
     east, north = np.concatenate([rng.uniform(-2e5, 2e5, (200, 2)), [[0.0, 0.0], [1e9, 0.0], [math.nan, 0.0]]]).T
     lon, lat = back.transform(east, north)
     np.testing.assert_array_equal(frame.to_degrees(east, north), np.stack([lat, lon], axis=-1))
     lat, lon = np.append(lat, [95.0, 10.0, -90.0]), np.append(lon, [0.0, 720.0, 0.0])
     there = np.stack(forward.transform(lon, lat), axis=-1)
     np.testing.assert_array_equal(frame.to_plane(lat, lon), there)
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize(
+    ("epsg", "origin"),
+    [(4326, (36.6, -84.3)), (4269, (36.6, -84.3)), (4326, (10.0, 180.0)), (32616, (36.6, -84.3)), (27700, (52.0, -1.0)),
+     (2056, (46.8, 8.2)), (2263, (40.7, -73.9))],
+)  # fmt: skip
+def test_a_rasters_coordinates_are_what_proj_makes_of_the_plane_itself(epsg: int, origin: tuple[float, float]) -> None:
+    frame, horizontal = Frame(*origin), CRS.from_epsg(epsg)
+    places = np.random.default_rng(3).uniform(-3e4, 3e4, (2, 200))
+    way = plane_to_raster(frame, horizontal, (-3e4, -3e4, 3e4, 3e4), where="terrain.dem")
+    several = Transformer.from_crs(crs_of(frame), horizontal, always_xy=True, allow_ballpark=False)
+    several.transform(0.0, 0.0)
+    one = several.get_last_used_operation()
+    there = one.transform(*places)
+    atol = 0.0 if horizontal.is_geographic else 2e-8  # metres, or feet, of 4e6
+    np.testing.assert_allclose(way.to_raster(*places), there, rtol=0.0, atol=atol)
+    back = np.stack(one.transform(*there, direction="INVERSE"), axis=-1)
+    np.testing.assert_allclose(way.to_plane(*there), back, rtol=0.0, atol=2e-8)
+    assert way.accuracy_m == one.accuracy

@@ -14,6 +14,7 @@ from gcsplan.arrays import Floats
 from gcsplan.world.geodesy.frame import Frame
 from gcsplan.world.geometry.surface import GridMap, Surface
 from tests.support.effort import draws
+from tests.support.planes import crs_of
 
 FLAT = GridMap.affine(0.0, 0.0, 1.0, 1.0)  # column = east, row = south
 
@@ -22,7 +23,7 @@ class Exact:
     """The map from plane to nodes of a raster in ``epsg``, by pyproj alone; ``cell``: cell size in raster units."""
 
     def __init__(self, frame: Frame, epsg: int, cell: float) -> None:
-        self.transformer = Transformer.from_crs(frame.crs, epsg, always_xy=True)
+        self.transformer = Transformer.from_crs(crs_of(frame), epsg, always_xy=True)
         self.cell = cell
         self.x0, self.y0 = self.transformer.transform(0.0, 0.0)
 

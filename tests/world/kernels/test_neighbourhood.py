@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
 from gcsplan.world.airspace import Airspace, Legs
+from gcsplan.world.geodesy.frame import Frame
 from gcsplan.world.geometry.limits import Limits
 from gcsplan.world.geometry.surface import GridMap, Surface
 from gcsplan.world.kernels import neighbourhood as _neighbourhood
 from gcsplan.world.kernels.field import Field
 from gcsplan.world.kernels.neighbourhood import LineBatch, Neighbourhood, Neighbourhoods, extrema_around
-from gcsplan.world.kernels.shared import MASK, SHIFT, LocalExtrema
+from gcsplan.world.kernels.shared import MASK, SHIFT, LocalExtrema, steps_of
 
 
 def legs_of(start: Floats, end: Floats) -> Legs:
@@ -250,3 +251,19 @@ def test_a_line_across_a_large_surface_takes_memory_for_its_tiles_alone() -> Non
     ours.along(line)
     assert ours.examined_bytes < 20_000_000
     assert held_bytes() - before < ours.examined_bytes + 10_000_000
+
+
+def test_the_bounds_of_a_map_are_its_least_steps_and_its_largest_bend() -> None:
+    frame = Frame(60.0, 10.0)
+    grid = GridMap.fit(lambda e, n: tuple(frame.to_degrees(e, n).T[::-1] * 3600.0), (-4e4, -4e4, 4e4, 4e4))
+    field, at = Field.of(grid), np.random.default_rng(1).uniform(-4e4, 4e4, (300, 2))
+    inverse = [np.linalg.inv(grid.jacobian(*place)) for place in at.tolist()]
+    x, y = np.array([steps_of(*m.ravel().tolist()) for m in inverse]).T
+    assert 0.997 * x.min() < field.step_x <= x.min()
+    assert 0.99 * y.min() < field.step_y <= y.min()
+    turns = []
+    for place, cells, angle in zip(at.tolist(), inverse, np.linspace(0.0, 2.0 * np.pi, len(at)), strict=True):
+        ahead = 10.0 * np.array([np.cos(angle), np.sin(angle)])
+        before, here, behind = (grid(*(place + s * ahead)) for s in (-1.0, 0.0, 1.0))
+        turns.append(np.linalg.norm(cells @ (before - 2.0 * here + behind)) / 100.0)
+    assert 0.5 * field.bend < max(turns) <= field.bend
