@@ -301,7 +301,7 @@ def rehearse(
 
     require(
         "rehearse", planned=planned, wind_m_s=wind_m_s, from_deg=from_deg, gusts_m_s=gusts_m_s, noise_m=noise_m,
-        runs=runs, seed=seed, progress=progress, jobs=jobs,
+        runs=runs, seed=seed, progress=progress, jobs=jobs, cluster=cluster,
     )  # fmt: skip
     returns.judged(planned, home=False)
     if seed is None or seed < 0:
@@ -406,7 +406,7 @@ def new(
     if bool(rasters) == (flat_m is not None):
         raise UsageError("the ground is `dem` or `flat_m`: give one of them", where="new()")
     if autopilot not in tuple(Autopilot):
-        raise UsageError(f"autopilot is one of {', '.join(Autopilot)}; given {autopilot!r}", where="new()")
+        raise wrong_argument("new()", "autopilot", autopilot, f"one of {', '.join(Autopilot)}")
     try:
         begin, end = place_text(start), place_text(goal)
     except ValueError as why:

@@ -168,9 +168,11 @@ class Planner:
         """Set all keys to those of ``mission``, such as an earlier `mission` of this session.
 
         Raises InputError, UsageError."""
-        require_kind("restore()", "mission", mission, Mapping, "a mapping of a mission's keys")
+        expected = "a mapping of a mission's keys"
+        require_kind("restore()", "mission", mission, Mapping, expected)
+        keys = dict(elements("restore()", "mission", mission.items(), tuple, expected))
         with self._state:
-            self._content = _with_keys(self._content, mission)
+            self._content = _with_keys(self._content, keys)
 
     def loaded(self) -> MissionFile:
         """The mission as it is now, as `load_mission` returns it; files are not read again.

@@ -12,7 +12,7 @@ import os
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from datetime import datetime
+from datetime import MAXYEAR, MINYEAR, datetime
 from functools import partial
 from itertools import chain
 from typing import Any, get_args
@@ -175,6 +175,8 @@ def load_mission(
     made_by_caller = elements(of, "changes", changes, MissionChange, "a list of MissionChange")
     if departure is not None:
         require_kind(of, "departure", departure, datetime, "a datetime")
+        if not MINYEAR < departure.year < MAXYEAR:
+            raise wrong_argument(of, "departure", departure, "a datetime with room for the hours around it")
     if terrain is not None:
         require_kind(of, "terrain", terrain, Mapping, "a mapping of keys of the section terrain")
     section = read_content({"terrain": terrain or {}}, None, held)[2]["terrain"]

@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 
 from gcsplan.arrays import Bools, Floats
-from gcsplan.errors import LimitValues, NoMission, NoMissionReason
+from gcsplan.errors import LimitValues, NoMission, NoMissionReason, wrong_argument
 from gcsplan.notes.note import Note
 from gcsplan.planners.airspeed import Airspeed
 from gcsplan.planners.budget import Budget
@@ -326,6 +326,9 @@ class Refusal(NoMission):
     ``cures``: see `NoMission`.
     """
 
+    east_m: float | None
+    north_m: float | None
+
     def __init__(
         self,
         message: str,
@@ -337,8 +340,12 @@ class Refusal(NoMission):
         cures: tuple[LimitValues, ...] = (),
     ) -> None:
         super().__init__(message, reason=reason, cures=cures)
-        self.east_m = None if place is None else float(place[0])
-        self.north_m = None if place is None else float(place[1])
+        self.east_m = self.north_m = None
+        if place is not None:
+            try:
+                self.east_m, self.north_m = map(float, place)
+            except Exception as why:  # a planner of another package gives it
+                raise wrong_argument("Refusal()", "place", place, "a pair of metres, east and north") from why
         self.place_of = place_of
         self.untried = untried
 

@@ -10,6 +10,7 @@ import copy
 import datetime
 import decimal
 import fractions
+import inspect
 import math
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
@@ -18,12 +19,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+import gcsplan
 from gcsplan.app import api
 from gcsplan.app.fleet.pipeline import load_mission, plan
 from gcsplan.app.plan.model import Plan
 from gcsplan.app.session import Planner
-from gcsplan.errors import GcsplanError, InputError
-from gcsplan.planners.problem import Solution
+from gcsplan.errors import GcsplanError, InputError, UsageError
+from gcsplan.mavlink.mission.mission import MissionItem
+from gcsplan.planners.problem import Refusal, Solution
 from gcsplan.plugins import OUTPUTS, PLANNERS, ZONE_READERS, register_output, register_planner, register_zone_reader
 from gcsplan.world.geometry.path import Path as Way
 from tests.export.test_output_schema import FLAT
@@ -234,3 +237,78 @@ def test_strange_results_of_additions_are_refused_by_their_name(planned: Plan, t
         with pytest.raises(InputError, match="strange"):
             load_mission({**FLAT, "no_fly": [{"file": str(file)}]})
         refused(lambda value=value: register_planner(value, len))
+
+
+MORE: list[Any] = [
+    10**30, "", "36.6,-84.3\udcff", b"\xff" * 9, np.float32("nan"), np.int64(3), np.bool_(True), np.array(3.0),
+    np.array([1, 2]), np.array("x"), [[]], (), {"a": np.nan}, frozenset(), datetime.datetime(1, 1, 1), "/", "." * 5000,
+    datetime.date(2026, 1, 1), iter([1]), (x for x in "a"), Exception, lambda: 0, 2**63, ["\ud800"], {"\ud800": 1},
+    np.zeros((2, 2, 2)), np.zeros((0, 3)), bytearray(b"x"), memoryview(b"x"), complex("nan"), np.datetime64("NaT", "s"),
+]  # fmt: skip
+
+NOBODY = "uav1=udpout:127.0.0.1:9"
+CALLS_BACK = {"progress", "on_path", "on_bound", "function", "cluster"}
+"""What a function raises that gcsplan calls, or an executor of the caller's own, is its own."""
+MADE_HERE = {
+    "BetterPath", "FleetPlan", "Finding", "JobResult", "LegFigures", "Mission", "MissionFile", "Plan", "Problem",
+    "Progress", "Rehearsal", "Solution", "VehiclePlan", "Verdict", "Via",
+}  # fmt: skip
+"""Records: types that gcsplan fills, or takes over without a look until a planner's result is judged."""
+
+
+def usual(planned: Plan, folder: Path) -> dict[str, tuple[Callable[..., Any], dict[str, Any]]]:
+    """Each public name with arguments that it takes, methods of a session and of results included."""
+    vehicle, session = planned.vehicles[0], Planner(FLAT)
+    unheard = {"timeout_s": 0.01, "allow_parameters": False}
+    calls: dict[str, dict[str, Any]] = {
+        "check": {"what": vehicle.mission, "within": planned}, "write": {"planned": planned, "folder": folder},
+        "report": {"planned": planned, "way_home": False}, "upload": {"planned": planned, "to": NOBODY, **unheard},
+        "verify": {"file": folder / "uav1.plan", "url": NOBODY[5:], **unheard}, "rehearse": {"planned": planned},
+        "download": {"url": NOBODY[5:], "timeout_s": 0.01}, "clear": {"url": NOBODY[5:], "timeout_s": 0.01},
+        "new": {"start": "36.6,-84.3", "goal": "36.61,-84.3", "flat_m": 300.0}, "load_mission": {"source": FLAT},
+        "fetch_dem": {"around": "36.6,-84.3", "radius_km": 1.0, "offline": True}, "plan": {"source": planned.source},
+        "Planner": {"mission": FLAT}, "Path": {"points": [[0, 0, 0], [1, 0, 0]]}, "register_output": {"name": "x"},
+        "MissionItem": {"command": 16, "frame": 3}, "Refusal": {"message": "x", "reason": "not_found"},
+        "register_planner": {"name": "x"}, "register_optimiser": {"name": "x"},
+        "register_zone_reader": {"ending": ".x"},
+    }  # fmt: skip
+    public = {name: getattr(gcsplan, name) for name in gcsplan.__all__ if name not in MADE_HERE | {"__version__"}}
+    errors = {name for name, one in public.items() if isinstance(one, type) and issubclass(one, GcsplanError)}
+    found = {name: (public[name], calls[name]) for name in public.keys() - (errors - {"Refusal"})}
+    methods = {"change": {"changes": {}}, "restore": {"mission": FLAT}, "plan": {}, "loaded": {}, "cancel": {}}
+    return found | {f"Planner.{name}": (getattr(session, name), given) for name, given in methods.items()}
+
+
+@pytest.mark.nightly
+@pytest.mark.usefixtures("nothing_added")
+def test_no_public_function_lets_another_error_through(
+    planned: Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name, (function, given) in usual(planned, tmp_path / "out").items():
+        for argument in inspect.signature(function).parameters.keys() - CALLS_BACK:
+            for value in (*VALUES, *MORE):
+                try:
+                    refused(lambda f=function, all_of={**given, argument: value}: f(**all_of))
+                except Exception as why:
+                    pytest.fail(f"{name}({argument}={type(value).__name__}) raises {type(why).__name__}: {why}")
+
+
+def test_records_that_planners_and_scripts_make_refuse_what_they_cannot_be() -> None:
+    for made in (
+        lambda: Way([[0, 0]]), lambda: Way("x"), lambda: Refusal("x", reason="not_found", place=7),
+        lambda: Refusal("x", reason="not_found", place=(1.0, 2.0, 3.0)), lambda: MissionItem(16, 3, x=1.5),
+        lambda: MissionItem("16", 3), lambda: MissionItem(16, 3, params=(0.0, 0.0, 0.0)),
+    ):  # fmt: skip
+        assert refused(made)
+    assert Refusal("x", reason="not_found", place=(1.0, np.float64(2.0))).north_m == 2.0
+
+
+@pytest.mark.slow
+def test_a_vehicle_that_a_fleet_does_not_have_is_refused_by_name(planned: Plan) -> None:
+    assert planned.fleet is not None
+    for look in (planned.fleet.slot, planned.fleet.motion):
+        with pytest.raises(InputError, match=r"takes the name of a vehicle, given 'uav9'"):
+            look("uav9")
+        with pytest.raises(UsageError, match=r"name is the name of a vehicle; given int 7"):
+            look(7)  # type: ignore[arg-type]

@@ -22,7 +22,7 @@ from gcsplan.app.check.worlds import (
     places_of,
 )
 from gcsplan.app.plan.way_home import is_required, lets_fly
-from gcsplan.errors import CheckFailed, GcsplanError, InputError, Mistake, UsageError, worst_of
+from gcsplan.errors import CheckFailed, GcsplanError, InputError, Mistake, UsageError, elements, worst_of
 from gcsplan.figures import counted
 from gcsplan.mavlink.files.file_items import MissionFileRead
 from gcsplan.mavlink.mission.mission import Home, Mission
@@ -84,7 +84,8 @@ def in_other_winds(source: MissionFile, wind: Mapping[str, object]) -> MissionFi
     content = source.content
     if content is None:
         raise UsageError("the mission was not made by load_mission: give its file, text or mapping", where="check()")
-    made = changed(content.given, [MissionChange("", "wind", "wind", dict(wind))], content.file.parent)
+    keys = dict(elements("check()", "wind", wind.items(), tuple, "a mapping of the keys of a mission's `wind`"))
+    made = changed(content.given, [MissionChange("", "wind", "wind", keys)], content.file.parent)
     again = load_content(replace(content, given=made.raw, text=None))  # lines of the text are those before
     return (again.at_level(source.level) if again.at_level is not None else None) or again
 

@@ -90,7 +90,7 @@ def plan(  # noqa: PLR0913 - options by name, each with a default
     """
     require(
         "plan", planner=planner, objective=objective, seed=seed, options=options, gate_utc=gate_utc, progress=progress,
-        jobs=jobs, leave_out=leave_out,
+        jobs=jobs, cluster=cluster, leave_out=leave_out,
     )  # fmt: skip
     if not isinstance(source, MissionFile):
         source = load_mission(source, departure=gate_utc, at=at)

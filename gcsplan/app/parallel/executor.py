@@ -12,6 +12,7 @@ import queue
 import signal
 import sys
 import threading
+from abc import ABC
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -23,7 +24,7 @@ from uuid import uuid4
 from gcsplan import __version__
 from gcsplan.errors import GcsplanError, InputError, UsageError
 
-__all__ = ["Executor", "Inline", "Lost", "executor", "in_order", "require_same_inputs"]
+__all__ = ["Executor", "Inline", "Lost", "Workers", "executor", "in_order", "require_same_inputs"]
 
 Shared = TypeVar("Shared")
 WorkItem = TypeVar("WorkItem")
@@ -57,6 +58,14 @@ MISSING = "needs dask.distributed, which is not installed: pip install 'gcsplan[
 
 Lost = Callable[[WorkItem, GcsplanError], WorkResult]
 """The result of a piece that no worker outlives."""
+
+
+class Workers(ABC):  # noqa: B024 - it knows its instances by what they have
+    """Objects that stand for workers: a client or a cluster of dask, or an `Executor`."""
+
+    @classmethod
+    def __subclasshook__(cls, kind: type) -> bool:
+        return any(hasattr(kind, name) for name in ("scheduler_info", "scheduler_address", "each"))
 
 
 class Executor(Protocol):

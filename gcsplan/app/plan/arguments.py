@@ -7,6 +7,7 @@ from datetime import datetime
 from numbers import Integral, Real
 from typing import Any
 
+from gcsplan.app.parallel.executor import Workers
 from gcsplan.app.plan.model import Plan
 from gcsplan.errors import PATH_KINDS, require_kind
 
@@ -28,6 +29,7 @@ EXPECTED: dict[str, tuple[Any, str]] = {
     "on_path": (Callable, "a function"),
     "on_bound": (Callable, "a function"),
     "jobs": (Integral, "a number of processes"),
+    "cluster": ((*PATH_KINDS, Workers), "a dask scheduler's address or file, or a client or cluster of dask"),
     "planned": (Plan, "a plan, as gcsplan.plan returns it"),
     "folder": (PATH_KINDS, "the path of a folder"),
     "file": (PATH_KINDS, "the path of a file"),

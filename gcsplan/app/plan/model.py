@@ -7,14 +7,14 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
 
 from gcsplan.app.plan.left_out import LeftOut
 from gcsplan.arrays import Floats
 from gcsplan.check.verdict import Verdict
-from gcsplan.errors import GcsplanError
+from gcsplan.errors import GcsplanError, require_kind, unknown_name
 from gcsplan.fleet.arrival import Slot
 from gcsplan.fleet.intervals import Interval
 from gcsplan.fleet.motion.timing import TimedPath
@@ -30,6 +30,8 @@ from gcsplan.world.world import World
 if TYPE_CHECKING:
     from gcsplan.fleet.separation import Encounter, Separation
 
+
+Named = TypeVar("Named", Slot, TimedPath)
 
 OUTPUTS = "gcsplan.app.output.files"
 """The module that makes documents of a plan, named as the table of planners names theirs: it is imported at need."""
@@ -190,17 +192,25 @@ class FleetPlan:
         return f"<FleetPlan {self.mode}: {len(self.slots)} vehicles>"
 
     def slot(self, name: str) -> Slot:
-        """The slot of a vehicle."""
-        return next(s for s in self.slots if s.name == name)
+        """The slot of a vehicle. Raises InputError, UsageError."""
+        return _of_name("slot()", name, self.slots)
 
     def motion(self, name: str) -> TimedPath:
-        """The motion of a vehicle."""
-        return next(m for m in self.motions if m.name == name)
+        """The motion of a vehicle. Raises InputError, UsageError."""
+        return _of_name("motion()", name, self.motions)
 
     @property
     def closest(self) -> Encounter | None:
         """The pair that comes nearest to each other in the air; None if no two ever fly at the same time."""
         return None if self.separation is None else self.separation.least
+
+
+def _of_name(where: str, name: str, all_of: Sequence[Named]) -> Named:
+    require_kind(where, "name", name, str, "the name of a vehicle")
+    found = next((one for one in all_of if one.name == name), None)
+    if found is None:
+        raise unknown_name(f"{where} takes the name of a vehicle, given {name[:64]!r}", name, (v.name for v in all_of))
+    return found
 
 
 @dataclass(frozen=True, eq=False)

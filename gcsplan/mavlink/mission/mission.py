@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from gcsplan.errors import InputError
+from gcsplan.errors import InputError, raised
 from gcsplan.mavlink.mission.commands import DELAY, DO_CHANGE_SPEED, WAYPOINT
 from gcsplan.vehicle import Autopilot
 
@@ -30,7 +30,7 @@ NumberKept = Callable[[float], float]
 MISSION, FENCE, RALLY, ALL = 0, 1, 2, 255
 
 
-_ONE, _FIVE, _WIRE = struct.Struct("<f"), struct.Struct("<5f"), struct.Struct("<4fiifHBB")
+_ONE, _WIRE = struct.Struct("<f"), struct.Struct("<4fiifHBB")
 
 
 def float32(value: float) -> float:
@@ -63,19 +63,30 @@ class MissionItem:
     autocontinue: bool = True
 
     def __post_init__(self) -> None:
+        try:
+            *params, z = self._rounded()
+        except InputError:
+            raise
+        except Exception as why:  # numbers of another type, or a stranger's
+            words = "an item has whole numbers command, frame, x and y, and numbers params (four) and z"
+            raise InputError(f"{words}: {raised(why)}", where="MissionItem()") from why
+        object.__setattr__(self, "params", tuple(params))
+        object.__setattr__(self, "z", z)
+
+    def _rounded(self) -> Sequence[float]:
+        """Params and z as the wire has them."""
         if len(self.params) != 4:
-            raise ValueError(f"an item has 4 params, given {len(self.params)}")
+            raise InputError(f"an item has 4 params, given {len(self.params)}")
         if not (
             0 <= self.command <= 65535 and 0 <= self.frame <= 255
             and -(2**31) <= self.x < 2**31 and -(2**31) <= self.y < 2**31
         ):  # fmt: skip
             self._refuse()
         try:
-            *params, z = _FIVE.unpack(_FIVE.pack(*self.params, self.z))
+            *params, _, _, z, _, _, _ = _WIRE.unpack(self.wire)
         except OverflowError:
-            *params, z = map(float32, (*self.params, self.z))
-        object.__setattr__(self, "params", tuple(params))
-        object.__setattr__(self, "z", z)
+            return [float32(value) for value in (*self.params, self.z)]
+        return *params, z
 
     def __reduce__(self) -> tuple[Callable[[bytes], MissionItem], tuple[bytes]]:
         """Pickle the numbers of the wire: small, and quick, for archives are handed from process to process."""

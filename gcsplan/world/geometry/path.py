@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gcsplan.arrays import Floats
+from gcsplan.errors import InputError, wrong_argument
 
 PLACES_AT_ONCE = 512
 """Places whose distance from a track is computed in one batch."""
@@ -19,9 +20,13 @@ class Path:
     points: Floats
 
     def __post_init__(self) -> None:
-        p = np.ascontiguousarray(self.points, dtype=np.float64)
+        expected = "(N, 3) finite metres with N >= 2"
+        try:
+            p = np.ascontiguousarray(self.points, dtype=np.float64)
+        except Exception as why:  # a stranger's numbers
+            raise wrong_argument("Path()", "points", self.points, expected) from why
         if p.ndim != 2 or p.shape[1] != 3 or len(p) < 2 or not np.isfinite(p).all():
-            raise ValueError(f"a path is (N, 3) finite metres with N >= 2, given shape {p.shape}")
+            raise InputError(f"a path is {expected}, given shape {p.shape}")
         p.setflags(write=False)
         object.__setattr__(self, "points", p)
 

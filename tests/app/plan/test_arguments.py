@@ -26,6 +26,8 @@ def no_planner(problem: object) -> None:
         ({"options": 3}, "options is a mapping"),
         ({"objective": 3}, "objective is 'length', 'energy' or 'time'"),
         ({"progress": 3}, "progress is a function"),
+        ({"cluster": 7}, "cluster is a dask scheduler's address or file, or a client or cluster of dask; given int 7"),
+        ({"cluster": ["tcp://127.0.0.1:1"]}, "cluster is a dask scheduler's address"),
         ({"gate_utc": "18:30"}, "gate_utc is a datetime"),
     ],
 )
