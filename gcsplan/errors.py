@@ -218,7 +218,7 @@ class NoMission(GcsplanError, RuntimeError):
 class CheckFailed(GcsplanError, RuntimeError):
     """A mission breaks a limit, or something in it could not be judged.
 
-    ``headline`` says what failed, and the message below it where: ``lines``.
+    ``headline`` says what failed; in the message a line for each place follows it.
     """
 
     exit_code = 4

@@ -27,7 +27,15 @@ from gcsplan.app.session import Planner
 from gcsplan.errors import GcsplanError, InputError, UsageError
 from gcsplan.mavlink.mission.mission import MissionItem
 from gcsplan.planners.problem import Refusal, Solution
-from gcsplan.plugins import OUTPUTS, PLANNERS, ZONE_READERS, register_output, register_planner, register_zone_reader
+from gcsplan.plugins import (
+    OPTIMISERS_ADDED,
+    OUTPUTS,
+    PLANNERS,
+    ZONE_READERS,
+    register_output,
+    register_planner,
+    register_zone_reader,
+)
 from gcsplan.world.geometry.path import Path as Way
 from tests.export.test_output_schema import FLAT
 from tests.mission_file.test_memory_files import FEATURE, TERRAIN
@@ -214,7 +222,7 @@ def test_strange_arguments_of_the_functions_are_refused_by_name(planned: Plan, t
 @pytest.fixture
 def nothing_added() -> Iterator[None]:
     yield
-    for added in (PLANNERS, OUTPUTS, ZONE_READERS):
+    for added in (OPTIMISERS_ADDED, PLANNERS, OUTPUTS, ZONE_READERS):
         added.forget()
 
 
@@ -267,14 +275,16 @@ def usual(planned: Plan, folder: Path) -> dict[str, tuple[Callable[..., Any], di
         "download": {"url": NOBODY[5:], "timeout_s": 0.01}, "clear": {"url": NOBODY[5:], "timeout_s": 0.01},
         "new": {"start": "36.6,-84.3", "goal": "36.61,-84.3", "flat_m": 300.0}, "load_mission": {"source": FLAT},
         "fetch_dem": {"around": "36.6,-84.3", "radius_km": 1.0, "offline": True}, "plan": {"source": planned.source},
-        "Planner": {"mission": FLAT}, "Path": {"points": [[0, 0, 0], [1, 0, 0]]}, "register_output": {"name": "x"},
+        "Planner": {"mission": FLAT}, "Path": {"points": [[0, 0, 0], [1, 0, 0]]},
         "MissionItem": {"command": 16, "frame": 3}, "Refusal": {"message": "x", "reason": "not_found"},
-        "register_planner": {"name": "x"}, "register_optimiser": {"name": "x"},
-        "register_zone_reader": {"ending": ".x"},
+        **{f"register_{what}": {"name": "x", "function": len} for what in ("planner", "optimiser", "output")},
+        "register_zone_reader": {"ending": ".x", "function": len},
     }  # fmt: skip
     public = {name: getattr(gcsplan, name) for name in gcsplan.__all__ if name not in MADE_HERE | {"__version__"}}
     errors = {name for name, one in public.items() if isinstance(one, type) and issubclass(one, GcsplanError)}
-    found = {name: (public[name], calls[name]) for name in public.keys() - (errors - {"Refusal"})}
+    # What is registered stays, so that comes last.
+    looked_at = sorted(public.keys() - (errors - {"Refusal"}), key=lambda name: (name.startswith("register"), name))
+    found = {name: (public[name], calls[name]) for name in looked_at}
     methods = {"change": {"changes": {}}, "restore": {"mission": FLAT}, "plan": {}, "loaded": {}, "cancel": {}}
     return found | {f"Planner.{name}": (getattr(session, name), given) for name, given in methods.items()}
 
