@@ -276,14 +276,14 @@ def usual(planned: Plan, folder: Path) -> dict[str, tuple[Callable[..., Any], di
         "new": {"start": "36.6,-84.3", "goal": "36.61,-84.3", "flat_m": 300.0}, "load_mission": {"source": FLAT},
         "fetch_dem": {"around": "36.6,-84.3", "radius_km": 1.0, "offline": True}, "plan": {"source": planned.source},
         "Planner": {"mission": FLAT}, "Path": {"points": [[0, 0, 0], [1, 0, 0]]},
-        "MissionItem": {"command": 16, "frame": 3}, "Refusal": {"message": "x", "reason": "not_found"},
+        "MissionItem": {"command": 16, "frame": 3},
         **{f"register_{what}": {"name": "x", "function": len} for what in ("planner", "optimiser", "output")},
         "register_zone_reader": {"ending": ".x", "function": len},
     }  # fmt: skip
     public = {name: getattr(gcsplan, name) for name in gcsplan.__all__ if name not in MADE_HERE | {"__version__"}}
     errors = {name for name, one in public.items() if isinstance(one, type) and issubclass(one, GcsplanError)}
     # What is registered stays, so that comes last.
-    looked_at = sorted(public.keys() - (errors - {"Refusal"}), key=lambda name: (name.startswith("register"), name))
+    looked_at = sorted(public.keys() - errors, key=lambda name: (name.startswith("register"), name))
     found = {name: (public[name], calls[name]) for name in looked_at}
     methods = {"change": {"changes": {}}, "restore": {"mission": FLAT}, "plan": {}, "loaded": {}, "cancel": {}}
     return found | {f"Planner.{name}": (getattr(session, name), given) for name, given in methods.items()}

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
@@ -26,9 +26,6 @@ from gcsplan.world.geodesy.height_unit import BY_FILE, METRE, HeightUnit, unit_o
 
 WORST_SHIFT_M = 30.0
 """A horizontal datum shift less accurate than this, m, is refused: it would move hills by more than a DEM cell."""
-
-_DEGREES = CRS.from_proj4("+proj=longlat +datum=WGS84 +no_defs")
-"""The degrees that every plane is made of."""
 
 # Keys hold only letters and digits.
 _GEOIDS = {"EGM84": "EGM84", "EGM96": "EGM96", "EGM2008": "EGM2008", "AMSL": "AMSL", "MSL": "AMSL"}
@@ -310,6 +307,12 @@ def ways(source: CRS, target: CRS, *, allow_ballpark: bool) -> Transformer:
     return Transformer.from_crs(source, target, always_xy=True, allow_ballpark=allow_ballpark)
 
 
+@cache
+def _degrees() -> CRS:
+    """The degrees that every plane is made of."""
+    return CRS.from_proj4("+proj=longlat +datum=WGS84 +no_defs")
+
+
 @dataclass(frozen=True, slots=True)
 class RasterWay:
     """One fixed operation between the plane and a raster's coordinates, which passes degrees on WGS 84.
@@ -342,7 +345,7 @@ def plane_to_raster(frame: Frame, horizontal: Any, box: tuple[float, float, floa
     """
     lat, lon = frame.to_degrees(0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3])).tolist()
     try:
-        several = ways(_DEGREES, horizontal, allow_ballpark=False)
+        several = ways(_degrees(), horizontal, allow_ballpark=False)
         x, y = several.transform(lon, lat)
         if not (np.isfinite(x) and np.isfinite(y)):
             raise ProjError("the mission lies where this coordinate system is not defined")

@@ -50,10 +50,11 @@ def _bounds(grid: GridMap, affine: bool) -> tuple[float, float, float]:
 
     def derivative(du: int, dv: int) -> Floats:
         of_both = polyder(polyder(square, du, 1.0 / grid.scale_m), dv, 1.0 / grid.scale_m, axis=1)
-        return polygrid2d(f, f, of_both).reshape(2, -1)
+        return np.asarray(polygrid2d(f, f, of_both), float).reshape(2, -1)
 
     (a, c), (b, d) = derivative(1, 0), derivative(0, 1)  # of column and row
-    inverse = np.array([d, -b, -c, a]) / (a * d - b * c)
+    with np.errstate(divide="raise", invalid="raise"):  # no map of a raster folds
+        inverse = np.array([d, -b, -c, a]) / (a * d - b * c)
     # `steps_of` over the whole lattice at once.
     xx, yy = inverse[0] ** 2 + inverse[2] ** 2, inverse[1] ** 2 + inverse[3] ** 2
     skew = np.abs(inverse[0] * inverse[1] + inverse[2] * inverse[3])
