@@ -42,7 +42,8 @@ _AT_ONCE = 16
 
 
 def write_whole(path: str | os.PathLike[str], content: str | bytes) -> None:
-    """Write one file of the user's choice, whole or not at all, replacing an existing one. Raises InputError.
+    """Write one file of the user's choice, whole or not at all, replacing an existing one. Raises InputError, also for
+    a device such as ``/dev/null``.
 
     Half-written files beside it, left by an earlier run that was killed, are removed.
     """
@@ -64,6 +65,8 @@ def _uncut() -> Iterator[None]:
 
 def _replace(target: Path, data: bytes) -> None:
     try:
+        if target.exists() and not (target.is_file() or target.is_dir()):
+            raise ValueError("it is a device or a pipe, and no file takes its place")
         _sweep(target.parent)
         handle, part = new_part(target.parent)
         try:

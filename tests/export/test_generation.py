@@ -462,6 +462,19 @@ def test_a_file_has_the_mode_of_any_other(tmp_path: Path) -> None:
         assert (tmp_path / "out" / "uav1.plan").stat().st_mode & 0o777 == 0o640
 
 
+@posix
+def test_a_pipe_or_device_keeps_its_place(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    for target in (pipe, tmp_path / "link"):
+        if target != pipe:
+            target.symlink_to(os.devnull)
+        with pytest.raises(InputError, match="cannot be written: it is a device or a pipe"):
+            write_whole(target, "report")
+    assert pipe.is_fifo()
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["link", "pipe"]
+
+
 def test_two_names_that_are_one_on_this_disk_are_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     write_outputs(tmp_path, {"UAV1.plan": "old"})
     write_outputs(tmp_path, {"uav1.plan": "new"})
