@@ -254,7 +254,8 @@ def upload(
         allow_parameters=allow_parameters,
     )  # fmt: skip
     if isinstance(to, Mapping):
-        words = [f"{name}={url}" for name, url in to.items()]
+        pairs = elements("upload()", "to", to.items(), tuple, "a mapping from name to URL")
+        words = [f"{name}={url}" for name, url in pairs]
     else:
         words = (
             [to] if isinstance(to, str) else list(elements("upload()", "to", to, str, "a URL, or a list of NAME=URL"))
