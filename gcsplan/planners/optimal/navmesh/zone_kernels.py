@@ -397,13 +397,7 @@ def stamp_zones(
                 deepest = max(max(west, east), max(north_east, north_west))
                 shallowest = min(min(west, east), min(north_east, north_west))
                 if shallowest > 0.0 and zones[z, PAIR] == 0.0 and not under and zones[z, TOP] < np.inf:
-                    # The zone covers the whole cell and can only be flown over: its top is bilinear, as the ground is.
-                    twist = _twist(floor, ground, j, i) if zones[z, TOP_AGL] > 0.0 else 0.0
-                    for k in range(4):
-                        jj, ii = j + (k >> 1), i + ((k ^ (k >> 1)) & 1)
-                        top = level_at(zones, z, TOP, ground, up, down, jj, ii)
-                        wall[k] = top - min(floor[jj, ii] - excess[jj, ii], lid)
-                        wall[k] += -twist if low else twist
+                    _below_top(zones, z, floor, excess, ground, up, down, lid, low, wall, j, i)
                     count = put(of, values, cell, wall, count)
                     continue
                 if low and ways > 0:
@@ -442,6 +436,20 @@ def _twist(floor: Floats, ground: Floats, j: int, i: int) -> float:
         if abs(floor[jj, ii] - ground[jj, ii] - same) > 1e-9 * (1.0 + abs(floor[jj, ii])):
             return max(0.25 * abs(ground[j, i] + ground[j + 1, i + 1] - ground[j, i + 1] - ground[j + 1, i]), 1e-9)
     return 0.0
+
+
+@device
+def _below_top(
+    zones: Floats, z: int, floor: Floats, excess: Floats, ground: Floats, up: Floats, down: Floats, lid: float,
+    low: bool, wall: Floats, j: int, i: int,
+) -> None:  # fmt: skip
+    """How far a zone that covers the whole cell, and can only be flown over, rises above the highest altitude at its
+    corners: its top is bilinear, as the ground is."""
+    twist = _twist(floor, ground, j, i) if zones[z, TOP_AGL] > 0.0 else 0.0
+    for k in range(4):
+        jj, ii = j + (k >> 1), i + ((k ^ (k >> 1)) & 1)
+        top = level_at(zones, z, TOP, ground, up, down, jj, ii)
+        wall[k] = top - min(floor[jj, ii] - excess[jj, ii], lid) - (twist if low else -twist)
 
 
 @device
