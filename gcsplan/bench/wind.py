@@ -44,12 +44,16 @@ MIDDLE_DEG = 36.6, -84.3
 FORECAST_HOURS = [f"2026-11-28T{hour:02d}:00" for hour in range(9, 15)]
 FORECAST_AGL_M = 10, 80, 120
 BATTERY_J = 1e7
+MOST_SHOWN = 20
+"""Most faults, and refusals, that a report in words has."""
 RUNS_OF_FLEET = 5
 GATES = (1, 2, 3, "auto")
 DEPARTURE = datetime(2026, 11, 28, 10, 0, 0, tzinfo=UTC)
 """The common start of a fleet with gates, which is within the forecasts."""
 LANES_APART_DEG = 0.008
 """Distance of the starts, and of the goals, of neighbours in a fleet: 710 m or more, as wings circle at their goals."""
+Refusal = tuple[str, str, str]
+"""Which mission is refused, the kind of the reason, and the reason in words."""
 ENERGY_SLACK = 1.002
 """Simulated motion and planned motion take the same energy up to this factor in still air."""
 
@@ -61,7 +65,7 @@ def run(
     if not 1 <= flights <= MOST_FLIGHTS or not 0 <= beyond <= MOST_FLIGHTS:
         raise InputError(f"give 1 to {MOST_FLIGHTS} flights and at most as many beyond, not {flights} and {beyond}")
     rows: dict[str, Counter[str]] = {}
-    refused: Counter[str] = Counter()
+    refusals: list[Refusal] = []
     faults: list[str] = []
     outside: Counter[str] = Counter()
     number = flown = blown = 0
@@ -71,20 +75,21 @@ def run(
             raise InputError(f"seed {seed}: too few missions can be planned")
         with TemporaryDirectory() as folder:
             kind, document = mission_of(seed, number, Path(folder))
-            planned = _planned(document, refused)
+            named = f"seed {seed}, mission {number} ({kind})"
+            planned = _planned(document, named, refusals)
         if planned is None:
             continue
         runs = min(RUNS, flights - flown)
         result = rehearse(planned, weather=weather_of(planned.source, None, None, 0.0, 0.0), runs=runs, seed=number)
         flown += runs
         row = rows.setdefault(f"{document['vehicles'][0]['name']}, {kind}", Counter())
-        faults += _count(row, planned, result, runs, f"seed {seed}, mission {number} ({kind})")
+        faults += _count(row, planned, result, runs, named)
         if blown < beyond:
             blown += _beyond(planned, outside, min(RUNS, beyond - blown), number, faults)
         if tell is not None and number % 10 == 0:
             tell(f"{flown} of {flights} flights, {len(faults)} faults")
     return {
-        "flights": flown, "beyond": blown, "seed": seed, "missions": number, "refused": dict(refused),
+        "flights": flown, "beyond": blown, "seed": seed, "missions": number, **_refused(refusals),
         "kinds": {kind: dict(row) for kind, row in sorted(rows.items())}, "beyond_flights": dict(outside),
         "faults": faults,
     }  # fmt: skip
@@ -95,12 +100,13 @@ def run_fleets(fleets: int, *, seed: int = 1, tell: Callable[[str], None] | None
     if not 1 <= fleets <= MOST_FLIGHTS:
         raise InputError(f"give 1 to {MOST_FLIGHTS} fleets, not {fleets}")
     rows: dict[str, Counter[str]] = {}
-    refused: Counter[str] = Counter()
+    refusals: list[Refusal] = []
     faults: list[str] = []
     for number in range(1, fleets + 1):
         with TemporaryDirectory() as folder:
             kind, document = fleet_of(seed, number, Path(folder))
-            planned = _planned(document, refused, DEPARTURE if "gates" in document["arrival"] else None)
+            named = f"seed {seed}, fleet {number} ({kind})"
+            planned = _planned(document, named, refusals, DEPARTURE if "gates" in document["arrival"] else None)
         if planned is None:
             continue
         weather = weather_of(planned.source, None, None, 0.0, 0.0)
@@ -113,29 +119,40 @@ def run_fleets(fleets: int, *, seed: int = 1, tell: Callable[[str], None] | None
         row = rows.setdefault(kind, Counter())
         row.update(fleets=1, runs=RUNS_OF_FLEET, in_still_air=still, held=min(kept.values()) == RUNS_OF_FLEET, **kept)
         if not still:
-            named = f"seed {seed}, fleet {number} ({kind})"
             lost = [f"{what} kept in {count} of {RUNS_OF_FLEET} runs" for what, count in kept.items()]
             faults += [f"{named}: {words}" for words, n in zip(lost, kept.values(), strict=True) if n < RUNS_OF_FLEET]
         if tell is not None and number % 10 == 0:
             tell(f"{number} of {fleets} fleets, {len(faults)} faults")
     return {
-        "fleets": fleets, "seed": seed, "refused": dict(refused), "faults": faults,
+        "fleets": fleets, "seed": seed, **_refused(refusals), "faults": faults,
         "kinds": {kind: dict(row) for kind, row in sorted(rows.items())},
     }  # fmt: skip
 
 
-def _planned(document: dict[str, Any], refused: Counter[str], start: datetime | None = None) -> Plan | None:
+def _planned(
+    document: dict[str, Any], named: str, refusals: list[Refusal], start: datetime | None = None
+) -> Plan | None:
     """The plan of a mission that passes, with a common start or without; None, and why, of any other."""
     try:
         planned = plan(load_mission(document, departure=start), gate_utc=start)
     except NoMission as refusal:
-        refused[refusal.reason] += 1
+        refusals.append((named, refusal.reason, str(refusal)))
         return None
     for v in planned.vehicles:
         if v.verdict.safe is not True:
-            refused[v.verdict.findings[0].kind if v.verdict.findings else "not judged"] += 1
+            found, notes = v.verdict.findings, v.verdict.not_judged
+            words = "; ".join(str(note) for note in found or notes)
+            refusals.append((named, found[0].kind if found else "not judged", f"{v.name}: {words}"))
             return None
     return planned
+
+
+def _refused(refusals: Sequence[Refusal]) -> dict[str, Any]:
+    """How many are refused for each kind of reason, and the reason of each."""
+    return {
+        "refused": dict(Counter(kind for _, kind, _ in refusals)),
+        "refusals": [f"{named}: {words}" for named, _, words in refusals],
+    }
 
 
 def _count(row: Counter[str], planned: Plan, result: Rehearsal, runs: int, named: str) -> list[str]:
@@ -324,8 +341,7 @@ def report(result: dict[str, Any]) -> str:
             f"{result['beyond']} flights beyond the declared winds: {beyond['inside']} inside all the same, "
             f"{beyond['named']} named as outside, {beyond['never']} named as never arriving"
         )
-    lines += [f"fault: {fault}" for fault in result["faults"][:20]]
-    return "\n".join(lines)
+    return "\n".join([*lines, *_faults_and_refusals(result)])
 
 
 def report_fleets(result: dict[str, Any]) -> str:
@@ -344,5 +360,14 @@ def report_fleets(result: dict[str, Any]) -> str:
         f"{row['intervals']:>11}{row['separation']:>12}"
         for kind, row in result["kinds"].items()
     ]
-    lines += [f"fault: {fault}" for fault in result["faults"][:20]]
-    return "\n".join(lines)
+    return "\n".join([*lines, *_faults_and_refusals(result)])
+
+
+def _faults_and_refusals(result: dict[str, Any]) -> list[str]:
+    """Faults and refusals, `MOST_SHOWN` of each at most."""
+    lines = []
+    for word, found in (("fault", result["faults"]), ("refused", result["refusals"])):
+        lines += [f"{word}: {one}" for one in found[:MOST_SHOWN]]
+        if len(found) > MOST_SHOWN:
+            lines.append(f"{word}: {len(found) - MOST_SHOWN} more (--json has all)")
+    return lines

@@ -42,7 +42,15 @@ def test_lost_intervals_are_counted_and_only_broken_words_are_faults() -> None:
     assert sum(row["fleets"] for row in result["kinds"].values()) + sum(result["refused"].values()) == 2
     assert all(row["held"] + row["in_still_air"] >= row["fleets"] for row in result["kinds"].values())
     assert result["faults"] == []
+    assert len(result["refusals"]) == sum(result["refused"].values())
     assert "kept everything" in wind.report_fleets(result)
+
+
+def test_a_report_shows_some_refusals_and_how_many_more_there_are() -> None:
+    why = [f"fleet {k}: too late" for k in range(wind.MOST_SHOWN + 5)]
+    words = wind.report_fleets({"fleets": len(why), "refused": {}, "refusals": why, "faults": [], "kinds": {}})
+    assert words.count("too late") == wind.MOST_SHOWN
+    assert "refused: 5 more" in words
 
 
 def test_a_number_out_of_range_is_refused() -> None:
