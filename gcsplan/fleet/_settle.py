@@ -17,7 +17,7 @@ from gcsplan.fleet._sweep import reach_of
 from gcsplan.fleet._taken import Spans, Taken
 from gcsplan.fleet.arrival import WITHIN_S, Craft, Crew, Hold, Mode, Schedule, Slot, schedule
 from gcsplan.fleet.motion.timing import Route, TimedPath, speed_for
-from gcsplan.fleet.separation import TOLERANCE_M, Conflict, Rules, separation
+from gcsplan.fleet.separation import TOLERANCE_M, Conflict, Rules, conflicts_of
 from gcsplan.notes.note import Note
 
 How = Literal["as scheduled", "departure", "speed", "hold", "path"]
@@ -479,8 +479,7 @@ def _conflicts(path: TimedPath, taken: Taken) -> list[Conflict]:
     """The conflicts of a motion with the vehicles that have priority, by time."""
     spans = taken.forbidden(path)
     others = sorted(set(spans.who[spans.holds(0.0)].tolist()))
-    judged = separation([path, *(taken.paths[k] for k in others)], taken.rules)
-    return [c for c in judged.conflicts if path.name in c.worst.vehicles]
+    return conflicts_of(path, [taken.paths[k] for k in others], taken.rules)
 
 
 def _at_goals(conflict: Conflict, plan: Schedule, rules: Rules) -> bool:

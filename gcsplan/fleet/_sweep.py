@@ -35,6 +35,9 @@ DRIFTS_AT_ONCE = 4_000_000
 Apart = tuple[float | Floats, float | Floats]
 """The least and the most of a difference of two times, s, for each row or for all."""
 
+NEARER = 2
+"""Times that the pieces about each slice are found: by a vehicle's whole reach, then by that of these pieces."""
+
 SLACK_M = 1e-7
 """Metres by which rounding may falsify a bound, and so the largest distance error of the search."""
 
@@ -57,17 +60,23 @@ class Pieces:
         return Pieces(self.from_s[rows], self.to_s[rows], self.places[rows], self.velocity[rows])
 
     def joined(self, other: Pieces) -> Pieces:
-        """These pieces, followed by others."""
+        """These pieces, followed by others, without their drifts."""
         return Pieces(
             np.concatenate([self.from_s, other.from_s]),
             np.concatenate([self.to_s, other.to_s]),
             np.concatenate([self.places, other.places]),
             np.concatenate([self.velocity, other.velocity]),
-            None if self.drifts is other.drifts is None else self._drifts().joined(other._drifts()),
         )
 
     def _drifts(self) -> Drifts:
         return Drifts.none(len(self.from_s)) if self.drifts is None else self.drifts
+
+    def off_s(self, window_s: float) -> tuple[float | Floats, float | Floats]:
+        """The earliest and the latest (n,) that each may be of its time table, in any wind or ``window_s``."""
+        if self.drifts is None:
+            return -window_s, window_s
+        early, late = self.drifts.early.min(axis=0), self.drifts.late.max(axis=0)
+        return np.minimum(early, -window_s), np.maximum(late, window_s)
 
     def apart_s(self, a: Indices, other: Pieces, b: Indices, window_s: float) -> Apart:
         """The least and the most by which the time table's times of two places may differ if two are there at once:
@@ -225,17 +234,20 @@ class Fleet:
 
     ``pieces`` holds the pieces of all vehicles in turn, ``offset`` (V,) the first of each. ``nodes`` (V, K + 1, 3) are
     the places at the slices' ends (on the ground before take-off and after landing). ``stray`` is (V, K), in metres.
-    A vehicle is within ``reach_s`` (V,) of its time table: its drift in the declared winds, or ``window_s``.
-    ``fastest`` (V, K) is the top speed, m/s, in a slice and this about it. ``begins`` and ``ends`` (V,) are the times
-    in the air. ``first`` and ``last`` (V, K) are the pieces in a slice and ``reach_s`` about it, numbered over all
-    vehicles.
+    A vehicle is within ``reach_s`` (V,) of its time table, and in a slice within ``near_s`` (V, K): its drift in the
+    declared winds, or ``window_s``. ``fastest`` (V, K) is the top speed, m/s, in a slice and this about it. ``begins``
+    and ``ends`` (V,) are the times in the air. ``first`` and ``last`` (V, K) are the pieces in a slice and ``near_s``
+    about it, numbered over all vehicles. ``off_s``: the earliest and the latest that each piece may be of its time
+    table.
     """
 
     paths: tuple[TimedPath, ...]
     window_s: float
     reach_s: Floats
+    near_s: Floats
     edges_s: Floats
     pieces: Pieces
+    off_s: tuple[float | Floats, float | Floats]
     offset: Indices
     nodes: Floats
     stray: Floats
@@ -257,18 +269,21 @@ class Fleet:
         edges = _edges(paths, float(reach_s.max()))
         count = len(edges) - 1
         shape = (len(paths), count)
-        nodes, stray, fastest = np.empty((len(paths), count + 1, 3)), np.empty(shape), np.empty(shape)
+        nodes, stray, fastest, near = np.empty((len(paths), count + 1, 3)), *(np.empty(shape) for _ in range(3))
         first, last = np.empty(shape, dtype=np.intp), np.empty(shape, dtype=np.intp)
         parts, offset, total = [], np.empty(len(paths), dtype=np.intp), 0
         for v, path in enumerate(paths):
             piece = pieces_of(path)
             nodes[v], stray[v] = _strays(path, edges)
-            reach = float(reach_s[v])
-            low = np.searchsorted(piece.from_s, edges[:-1] - reach, side="right") - 1
-            high = np.searchsorted(piece.from_s, edges[1:] + reach, side="left") - 1
-            high[-1] = np.searchsorted(piece.from_s, edges[-1] + reach, side="right") - 1  # with the stay at the end
-            low, high = np.maximum(low, 0), np.maximum(high, 0)
-            speed = np.sqrt((piece.velocity**2).sum(axis=1))
+            speed, early, late = np.sqrt((piece.velocity**2).sum(axis=1)), *piece.off_s(window_s)
+            off = np.maximum(np.abs(early), np.abs(late)) + np.zeros(len(speed))
+            near[v] = reach_s[v]
+            for _ in range(NEARER):  # a place of the time table within the reach has a reach of its own
+                low = np.searchsorted(piece.from_s, edges[:-1] - near[v], side="right") - 1
+                high = np.searchsorted(piece.from_s, edges[1:] + near[v], side="left") - 1
+                high[-1] = np.searchsorted(piece.from_s, edges[-1] + near[v, -1], side="right") - 1  # with the stay
+                low, high = np.maximum(low, 0), np.maximum(high, 0)
+                near[v] = _largest(off, low, high)
             fastest[v] = _largest(speed, low, high)
             first[v], last[v], offset[v] = low + total, high + total, total
             total += len(speed)
@@ -277,8 +292,9 @@ class Fleet:
         begins = np.array([p.begin_s for p in paths])
         ends = np.array([FOREVER_S if p.ends_in_air else p.end_s for p in paths])
         return cls(
-            tuple(paths), window_s, reach_s, edges, pieces, offset, nodes, stray, fastest, begins, ends, first, last
-        )
+            tuple(paths), window_s, reach_s, near, edges, pieces, pieces.off_s(window_s), offset, nodes, stray, fastest,
+            begins, ends, first, last,
+        )  # fmt: skip
 
     def bounds(self, i: Indices, j: Indices) -> tuple[Floats, Floats]:
         """For pairs (M,): a lower bound in each slice (M, K), and the least distance at the slices' ends (M,), metres.
@@ -301,7 +317,7 @@ class Fleet:
         least2 = np.maximum(square[:, :-1] + part * (2.0 * cross + part * speed2) - rounding, 0.0)
         bound = np.sqrt(least2) - self.stray[i] - self.stray[j]
         if (reach > 0.0).any():
-            bound -= reach[i, None] * self.fastest[i] + reach[j, None] * self.fastest[j]
+            bound -= self.near_s[i] * self.fastest[i] + self.near_s[j] * self.fastest[j]
         first = np.maximum(self.begins[i] - reach[i], self.begins[j] - reach[j])
         last = np.minimum(self.ends[i] + reach[i], self.ends[j] + reach[j])
         shared = (edges[None, :-1] <= last[:, None]) & (edges[None, 1:] >= first[:, None])
@@ -311,8 +327,11 @@ class Fleet:
             seen[:] = np.inf
         return np.where(shared & (first <= last)[:, None], bound, np.inf), np.sqrt(seen)
 
-    def rows(self, i: Indices, j: Indices, k: Indices) -> Iterator[tuple[Indices, Indices, Indices, Apart]]:
-        """All pairs of pieces of vehicles ``i`` and ``j`` in slices ``k`` (n,) that may overlap in time, in blocks.
+    def rows(
+        self, i: Indices, j: Indices, k: Indices, below_m: Floats
+    ) -> Iterator[tuple[Indices, Indices, Indices, Apart]]:
+        """All pairs of pieces of vehicles ``i`` and ``j`` in slices ``k`` (n,) that may overlap in time, in blocks; of
+        vehicles that drift, the pairs alone that may be nearer than ``below_m`` (n,).
 
         Each block has the row numbers among the n, the numbers of the two pieces, and how far their times may differ.
         """
@@ -327,6 +346,16 @@ class Fleet:
             local = np.arange(len(of)) - (np.concatenate([[0], total])[of] - done)
             a = self.first[i[of], k[of]] + local // many_j[of]
             b = self.first[j[of], k[of]] + local % many_j[of]
+            early, late = self.off_s
+            if isinstance(early, np.ndarray) and isinstance(late, np.ndarray):
+                # Looking at each wind takes long, so first each of the two may be in a wind of its own.
+                keep = overlap_of(self.pieces, a, b, (early[b] - late[a], late[b] - early[a]))
+                of, a, b = of[keep], a[keep], b[keep]
+                once = np.sort(np.unique(a * len(self.pieces.from_s) + b, return_index=True)[1])  # in several slices
+                of, a, b = of[once], a[once], b[once]
+                any_wind = early[b] - late[a], late[b] - early[a]
+                keep = nearest(self.pieces.take(a), self.pieces.take(b), any_wind)[0] < below_m[of]
+                of, a, b = of[keep], a[keep], b[keep]
             apart = self.pieces.apart_s(a, self.pieces, b, self.window_s)
             keep = overlap_of(self.pieces, a, b, apart)
             low, high = (x if np.ndim(x) == 0 else np.asarray(x)[keep] for x in apart)
@@ -347,15 +376,17 @@ class Fleet:
             best = bound.argmin(axis=1)
             rows = np.arange(len(a))
             go = bound[rows, best] < ceiling - SLACK_M
-            self._look(a, b, rows[go], best[go], some, out)
+            self._look(a, b, rows[go], best[go], ceiling, some, out)
             bound[rows, best] = np.inf
             ceiling = np.minimum(ceiling, out.distance_m[some])
             more, where = np.nonzero(bound < (ceiling - SLACK_M)[:, None])
-            self._look(a, b, more.astype(np.intp), where.astype(np.intp), some, out)
+            self._look(a, b, more.astype(np.intp), where.astype(np.intp), ceiling, some, out)
         return out
 
-    def _look(self, i: Indices, j: Indices, pair: Indices, k: Indices, numbers: Indices, out: Least) -> None:
-        for of, a, b, apart in self.rows(i[pair], j[pair], k):
+    def _look(
+        self, i: Indices, j: Indices, pair: Indices, k: Indices, below_m: Floats, numbers: Indices, out: Least
+    ) -> None:
+        for of, a, b, apart in self.rows(i[pair], j[pair], k, below_m[pair]):
             if not len(of):
                 continue
             distance, t1, t2 = nearest(self.pieces.take(a), self.pieces.take(b), apart)

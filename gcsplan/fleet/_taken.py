@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Indices
-from gcsplan.fleet._sweep import Pieces, pieces_of, reach_of, shifts
+from gcsplan.fleet._sweep import Pieces, pieces_of, shifts
 from gcsplan.fleet.motion.timing import TimedPath
 from gcsplan.fleet.separation import TOLERANCE_M, Rules
 from gcsplan.wind.drift import Drifts, between
@@ -42,13 +42,15 @@ class Boxes:
     high: Floats
 
     @classmethod
-    def of(cls, pieces: Pieces) -> Boxes:
-        """One box per piece, padded with empty boxes to a multiple of the largest group."""
+    def of(cls, pieces: Pieces, window_s: float) -> Boxes:
+        """One box per piece, padded with empty boxes to a multiple of the largest group; its seconds are those at
+        which the piece may be flown, in any wind or up to ``window_s`` early or late."""
+        early_s, late_s = pieces.off_s(window_s)
         ends = pieces.places + pieces.velocity * (pieces.to_s - pieces.from_s)[:, None]
         size = -(-len(ends) // WHOLE) * WHOLE
         low, high = np.full((size, 4), np.inf), np.full((size, 4), -np.inf)
-        low[: len(ends)] = np.column_stack([np.minimum(pieces.places, ends), pieces.from_s])
-        high[: len(ends)] = np.column_stack([np.maximum(pieces.places, ends), pieces.to_s])
+        low[: len(ends)] = np.column_stack([np.minimum(pieces.places, ends), pieces.from_s + early_s])
+        high[: len(ends)] = np.column_stack([np.maximum(pieces.places, ends), pieces.to_s + late_s])
         return cls(low, high)
 
     def grouped(self) -> Boxes:
@@ -131,12 +133,12 @@ class Taken:
         self.rules = rules
         self.paths: list[TimedPath] = []
         empty = np.zeros(0)
-        self._pieces = Pieces(empty, empty, np.zeros((0, 3)), np.zeros((0, 3)))
+        self._pieces = Pieces(empty, empty, np.zeros((0, 3)), np.zeros((0, 3)))  # without drifts
+        self._each: list[Pieces] = []  # of each vehicle, with drifts
         self._pads = np.zeros((0, 7))  # east and north of start and goal, begin, end, and whether it stands there after
         self._first: list[int] = []  # first piece of each vehicle; below, its first box
         self._first_box: list[int] = []
         self._levels = Boxes(np.zeros((0, 4)), np.zeros((0, 4))).levels()
-        self._reach_s = rules.window_s  # the largest of all
         self._begun, self._ended = Drifts.none(0), Drifts.none(0)  # of each motion, where it begins and ends
 
     def add(self, path: TimedPath) -> None:
@@ -145,11 +147,11 @@ class Taken:
         self._first.append(len(self._pieces.from_s))
         self._first_box.append(len(self._levels[-1].low))
         self._pieces = self._pieces.joined(pieces)
-        levels = Boxes.of(pieces).levels()
+        self._each.append(pieces)
+        levels = Boxes.of(pieces, self.rules.window_s).levels()
         self._levels = tuple(all_.joined(new) for all_, new in zip(self._levels, levels, strict=True))
         row = [*path.points[0, :2], *path.points[-1, :2], path.begin_s, path.end_s, float(self._lands(path))]
         self._pads = np.vstack([self._pads, row])
-        self._reach_s = max(self._reach_s, reach_of(path, self.rules.window_s))
         self._begun, self._ended = self._begun.joined(path.begin_drifts), self._ended.joined(path.end_drifts)
         self.paths.append(path)
 
@@ -172,11 +174,10 @@ class Taken:
     ) -> list[tuple[Floats, Floats, Indices]]:
         if not self.paths:
             return []
-        near, window = needed_m, self._reach_s + reach_of(path, self.rules.window_s)
-        own = pieces_of(path)
+        near, own = needed_m, pieces_of(path)
         # Own boxes at any allowed shift, widened by the separation: whatever they do not touch is clear.
-        less = np.array([near, near, near, window - low_s])
-        levels = [boxes.grown(less, np.array([near, near, near, window + high_s])) for boxes in Boxes.of(own).levels()]
+        less, more = np.array([near, near, near, -low_s]), np.array([near, near, near, high_s])
+        levels = [boxes.grown(less, more) for boxes in Boxes.of(own, self.rules.window_s).levels()]
         mine, theirs = np.meshgrid(np.arange(len(levels[0].low)), np.arange(len(self._levels[0].low)), indexing="ij")
         a, b = _touching(levels[0], mine.ravel(), self._levels[0], theirs.ravel())
         return [self._met(own, i, j, needed_m) for i, j in self._descend(levels, a, b, 1)]
@@ -199,11 +200,17 @@ class Taken:
 
     def _met(self, own: Pieces, a: Indices, box: Indices, needed_m: float) -> tuple[Floats, Floats, Indices]:
         who = np.searchsorted(self._first_box, box, side="right") - 1
-        b = box - np.asarray(self._first_box, dtype=np.intp)[who] + np.asarray(self._first, dtype=np.intp)[who]
+        theirs = box - np.asarray(self._first_box, dtype=np.intp)[who]
+        b = theirs + np.asarray(self._first, dtype=np.intp)[who]
         low, high = shifts(own.take(a), self._pieces.take(b), needed_m)
         met = low <= high
-        sooner, later = own.apart_s(a[met], self._pieces, b[met], self.rules.window_s)
-        return low[met] + sooner, high[met] + later, who[met]
+        low, high, a, theirs, who = low[met], high[met], a[met], theirs[met], who[met]
+        for one in np.unique(who):
+            rows = np.flatnonzero(who == one)
+            sooner, later = own.apart_s(a[rows], self._each[one], theirs[rows], self.rules.window_s)
+            low[rows] += sooner
+            high[rows] += later
+        return low, high, who
 
     def _on_the_pads(self, path: TimedPath, needed_m: float) -> tuple[Floats, Floats, Indices]:
         """Spans of shifts in which one vehicle takes off or lands beside another that stands on the ground."""

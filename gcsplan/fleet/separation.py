@@ -191,6 +191,17 @@ def separation(paths: Sequence[TimedPath], rules: Rules) -> Separation:
     )  # fmt: skip
 
 
+def conflicts_of(path: TimedPath, others: Sequence[TimedPath], rules: Rules) -> list[Conflict]:
+    """The conflicts of a motion with others, by time, as `separation` finds them; the others are not judged against
+    each other."""
+    paths = [path, *others]
+    fleet, count = Fleet.of(paths, rules.window_s), len(others)
+    i, j = np.zeros(count, dtype=np.intp), np.arange(1, count + 1, dtype=np.intp)
+    found = in_the_air(Pairs(fleet, i, j, fleet.least(i, j, rules.needed_m)), rules)
+    found += [c for c in on_the_pads(paths, rules) if path.name in c.worst.vehicles]
+    return sorted(found, key=lambda c: (c.from_s, c.worst.vehicles))
+
+
 def in_the_air(pairs: Pairs, rules: Rules) -> list[Conflict]:
     """Every time span in which a pair is nearer than needed, with its worst moment."""
     needed = rules.needed_m - TOLERANCE_M
@@ -201,8 +212,9 @@ def in_the_air(pairs: Pairs, rules: Rules) -> list[Conflict]:
         i, j = pairs.i[m : m + 1], pairs.j[m : m + 1]
         bound, _ = fleet.bounds(i, j)
         k = np.flatnonzero(bound[0] < needed)
+        near = np.full(len(k), needed)
         spans: list[tuple[float, float, float, float, float, int, int]] = []
-        for _, a, b, apart in fleet.rows(np.repeat(i, len(k)), np.repeat(j, len(k)), k):
+        for _, a, b, apart in fleet.rows(np.repeat(i, len(k)), np.repeat(j, len(k)), k, near):
             pa, pb = fleet.pieces.take(a), fleet.pieces.take(b)
             distance, t1, t2 = nearest(pa, pb, apart)
             if w > 0.0:
@@ -266,8 +278,8 @@ def on_the_pads(paths: Sequence[TimedPath], rules: Rules) -> list[Conflict]:
     second = (later > 0.0) | ((later == 0.0) & (order[:, None] > order[None, :]))
     lands_beside = near(goals, goals) & landing[None, :] & landing[:, None] & second
     for y, x in np.argwhere(lands_beside).tolist():
-        most_s = max(float(between(paths[y].end_drifts, paths[x].end_drifts)[1][0]), wide)
-        lands_beside[y, x] = ends[y] < cleared[x] + most_s
+        most_s = float(between(paths[y].end_drifts, paths[x].end_drifts)[1][0])
+        lands_beside[y, x] = ends[y] < cleared[x] + (max(most_s, wide) if wide else most_s)
     lands_before = near(goals, starts) & landing[:, None] & ((ends + early)[:, None] <= latest[None, :])
 
     def conflict(

@@ -21,7 +21,7 @@ from gcsplan.fleet.separation import Conflict, Rules, separation
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Energy, Vehicle
 from gcsplan.world.geometry.limits import Limits
-from tests.fleet.test_separation import random_fleet
+from tests.fleet.test_separation import drifting_fleet, random_fleet
 from tests.support.effort import draws
 from tests.support.flights import motions
 from tests.support.noted import codes
@@ -80,7 +80,7 @@ def test_a_shift_is_forbidden_exactly_where_the_shifted_motion_is_judged_a_confl
     free = looked = 0
     for seed in range(100):
         rng = np.random.default_rng(seed)
-        fleet = random_fleet(seed)
+        fleet = drifting_fleet(seed) if seed % 2 else random_fleet(seed)
         rules = Rules(
             float(rng.choice([5.0, 15.0])),
             window_s=float(rng.choice([0.0, 0.0, 0.3])),

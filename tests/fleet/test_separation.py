@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import combinations, pairwise
 
 import numpy as np
@@ -13,10 +14,11 @@ from numpy.typing import NDArray
 
 from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
-from gcsplan.fleet._sweep import Fleet, Pieces, nearest
+from gcsplan.fleet._sweep import Fleet, Pieces, nearest, pieces_of
 from gcsplan.fleet.motion.timing import TimedPath
-from gcsplan.fleet.separation import Conflict, Rules, in_metres, separation
+from gcsplan.fleet.separation import Conflict, Rules, conflicts_of, in_metres, separation
 from gcsplan.notes.note import Note
+from gcsplan.wind.drift import Drifts
 from tests.support.effort import draws
 
 FLEETS = [range(60), pytest.param(range(60, 1000), marks=pytest.mark.nightly)]
@@ -54,6 +56,27 @@ def random_fleet(seed: int) -> list[TimedPath]:
         points = first.points + np.array([9.0, 0.0, 0.0])
         fleet[1] = TimedPath("uav1", first.times_s, points, first.arrive_s, first.ends_in_air)
     return fleet
+
+
+def drifting_fleet(seed: int) -> list[TimedPath]:
+    """A random fleet, some of whose pieces are early or late by themselves in each of three winds."""
+    rng, fleet = np.random.default_rng(seed), random_fleet(seed)
+    for k in np.flatnonzero(rng.random(len(fleet)) < 0.7).tolist():
+        count = len(fleet[k].times_s) - 1
+        early = rng.uniform(-3.0, 2.0, (3, count)) * (rng.random(count) < 0.7)
+        fleet[k] = replace(fleet[k], drifts=Drifts(early, early + rng.uniform(0.0, 0.5, (3, count))))
+    return fleet
+
+
+def least_of_all_pieces_m(a: TimedPath, b: TimedPath, window_s: float) -> float:
+    """The least distance on any two pieces, each looked at."""
+    first, second = pieces_of(a), pieces_of(b)
+    i, j = (index.ravel() for index in np.indices((len(first.from_s), len(second.from_s))))
+    least_s, most_s = (np.zeros(len(i)) + s for s in first.apart_s(i, second, j, window_s))
+    x, y = first.take(i), second.take(j)
+    meet = (x.from_s <= y.to_s + most_s) & (y.from_s <= x.to_s - least_s)
+    x, y = x.take(np.flatnonzero(meet)), y.take(np.flatnonzero(meet))
+    return float(nearest(x, y, (least_s[meet], most_s[meet]))[0].min(initial=math.inf))
 
 
 def sampled(a: TimedPath, b: TimedPath, until_s: float) -> tuple[float, float]:
@@ -163,6 +186,25 @@ def test_with_a_window_the_least_distance_is_that_over_all_shifts() -> None:
             assert exact >= brute - between - 1e-6, f"seed {seed}: {exact}, sampled {brute}"
             met += 1
     assert met > draws(45) * 2 / 3
+
+
+@pytest.mark.slow
+@pytest.mark.draws
+def test_the_least_distance_of_motions_that_drift_is_that_of_all_their_pieces() -> None:
+    met = 0
+    for seed in range(draws(60)):
+        fleet, window_s = drifting_fleet(seed), float(np.random.default_rng(seed).choice([0.0, 0.5]))
+        found = separation(fleet, Rules(20.0, window_s=window_s))
+        for a, b in combinations(range(len(fleet)), 2):
+            brute_m = least_of_all_pieces_m(fleet[a], fleet[b], window_s)
+            assert found.distance_m[a, b] == pytest.approx(brute_m, abs=1e-6), f"seed {seed}"
+            met += math.isfinite(brute_m)
+        mine = [c for c in found.conflicts if "uav1" in c.worst.vehicles]
+        alone = conflicts_of(fleet[1], [path for path in fleet if path.name != "uav1"], found.rules)
+        assert [(c.kind, c.from_s, {*c.worst.vehicles}) for c in alone] == [
+            (c.kind, c.from_s, {*c.worst.vehicles}) for c in mine
+        ], f"seed {seed}"
+    assert met > draws(60)
 
 
 @pytest.mark.slow

@@ -125,7 +125,7 @@ class FleetOnBoard:
         if not self.keeps_apart or plan.fleet is None or plan.source.arrival is None:
             return None
         from gcsplan.app.fleet.fleet import motion_of, rules_of, too_near
-        from gcsplan.fleet.separation import separation
+        from gcsplan.fleet.separation import conflicts_of
 
         planned = next(v for v in plan.vehicles if v.name == name)
         flown = replace(planned, request=replace(planned.request, vehicle=vehicle), verdict=verdict)
@@ -134,8 +134,7 @@ class FleetOnBoard:
             others = [m for m in self._motions.values() if m.name != name]
             self._motions[name] = motion
         kept = [flown if v.name == name else v for v in plan.vehicles]
-        found = separation([motion, *others], rules_of(plan.source.arrival, kept, plan.world))
-        met = [c for c in found.conflicts if name in c.worst.vehicles]
+        met = conflicts_of(motion, others, rules_of(plan.source.arrival, kept, plan.world))
         return too_near(met, plan.world) if met else None
 
 

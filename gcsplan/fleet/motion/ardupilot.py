@@ -67,6 +67,10 @@ LAG_S, LAG_FROM, REST_M_S = 0.36, 0.6, 0.96
 """Speeding up by a factor f costs LAG_S·(ln f - LAG_FROM) seconds more than its curve, if that is above 0; a standstill
 counts as REST_M_S. Measured on ArduCopter 4.7 at 5 to 15 m/s, from rest and out of turns of 4 to 135 degrees."""
 
+LAST_FLOWN = 16
+"""Last speeds on stretches whose legs are kept: a search for a speed asks again for the two ends of its range, and the
+motion at the speed that it found is made next."""
+
 _TRIED, _ROUNDS = 16, 3
 _STEPS, _WITHIN = 30, 1e-6
 _HALVINGS = 60
@@ -203,7 +207,7 @@ class Curved:
 
     def time_s(self, cruise_m_s: float) -> float:
         """Seconds for the stretch at a cruise speed."""
-        flown, overlap, lag = self._legs(cruise_m_s)
+        flown, overlap, lag = _flown(self, cruise_m_s)
         return float(flown.time_s.sum() - overlap.sum() + lag.sum())
 
     def shares_s(self, cruise_m_s: float, legs: int) -> Floats:
@@ -211,11 +215,11 @@ class Curved:
 
         A leg ends in the middle of the turn, where ArduPilot counts its way point as reached.
         """
-        flown, overlap, lag = self._legs(cruise_m_s)
+        flown, overlap, lag = _flown(self, cruise_m_s)
         seconds = flown.time_s + lag
         seconds[1:] -= 0.5 * overlap
         seconds[:-1] -= 0.5 * overlap
-        part_s, leg = self._part_s(cruise_m_s), self._leg
+        part_s, leg = self.part_s(cruise_m_s), self.leg
         share = part_s / _summed(part_s, leg, len(self.way))[..., leg]
         each = seconds.reshape(*part_s.shape[:-1], len(self.way))
         return _summed(each[..., leg] * share, self.owner, legs)
@@ -226,7 +230,7 @@ class Curved:
         Straight motion at constant speed between them is at most ``error_m`` away from the true motion: with
         accelerations up to A, a piece of t seconds differs by A·t²/8.
         """
-        flown, overlap, lag = self._legs(cruise_m_s)
+        flown, overlap, lag = _flown(self, cruise_m_s)
         seconds, ramp = flown.time_s, flown.start_s
         begin = np.append(0.0, np.cumsum(seconds[:-1] - overlap))
         end = begin + seconds
@@ -244,11 +248,11 @@ class Curved:
         return times + late, places, self.owner[part]
 
     @property
-    def _leg(self) -> Indices:
+    def leg(self) -> Indices:
         """(P,) the leg of each part."""
         return np.floor(0.5 * (self.at[1:] + self.at[:-1])).astype(np.intp)
 
-    def _part_s(self, cruise_m_s: float) -> Floats:
+    def part_s(self, cruise_m_s: float) -> Floats:
         """(..., P) seconds of each part at its highest speed."""
         speed = np.minimum(self.most_m_s, cruise_m_s * self.per_cruise)
         if not self.follows.any():
@@ -261,29 +265,6 @@ class Curved:
             for one in speed.reshape(-1, speed.shape[-1])
         ]  # fmt: skip
         return np.reshape(found, speed.shape)
-
-    def _legs(self, cruise_m_s: float) -> tuple[Curves, Floats, Floats]:
-        """The legs' curves at a cruise speed; the seconds (L - 1,) for which each overlaps with the next; and the
-        seconds (L,) by which the vehicle lags behind while it speeds up on each.
-
-        Several flights stand one after another, as if it stood still between them: K·L legs.
-        """
-        part_s, count = self._part_s(cruise_m_s), len(self.way)
-        flights = part_s.size // part_s.shape[-1]
-        way, ends, begins = (np.tile(each, (flights, 1)) for each in (self.way, self.ends, self.begins))
-        run, rise = np.hypot(way[:, 0], way[:, 1]), way[:, 2]
-        length = np.hypot(run, rise)
-        speed = length / _summed(part_s, self._leg, count).ravel()
-        upward = np.full(len(length), self.vehicle.vertical_accel_m_s2)
-        accel = along_slope(run, rise, np.full(len(length), FULL_ACCEL * self.vehicle.accel_m_s2), upward, upward)
-        flown = curves(length, speed, accel, self.vehicle.leg_jerk_m_s3)
-        joint = np.arange(1, len(length))
-        joint = joint[joint % count > 0]  # where the leg with this number follows one without a stop
-        turns = _Turns.between(flown, (ends, begins), speed, self.vehicle, joint)
-        overlap, slow, found = np.zeros(len(length) - 1), np.full(len(length), REST_M_S), _overlaps(turns)
-        overlap[joint - 1], slow[joint] = found, np.maximum(turns.speed_m_s(found), REST_M_S)
-        lag = LAG_S * np.maximum(np.log(np.maximum(flown.peak_m_s / slow, 1.0)) - LAG_FROM, 0.0)
-        return flown, overlap, lag
 
     def _parts_s(self, flown: Curves, begin: Floats) -> Floats:
         """(K,) the times at which the ends of parts within a leg are passed."""
@@ -317,6 +298,32 @@ class Curved:
 
     def _along(self, at: Floats | Indices) -> Floats:
         return np.column_stack([np.interp(at, self.at, self.knots[:, k]) for k in range(3)])
+
+
+@lru_cache(maxsize=LAST_FLOWN)
+def _flown(way: Curved, cruise_m_s: float) -> tuple[Curves, Floats, Floats]:
+    """The legs' curves at a cruise speed; the seconds (L - 1,) for which each overlaps with the next; and the seconds
+    (L,) by which the vehicle lags behind while it speeds up on each.
+
+    Several flights stand one after another, as if it stood still between them: K·L legs.
+    """
+    part_s, count, vehicle = way.part_s(cruise_m_s), len(way.way), way.vehicle
+    flights = part_s.size // part_s.shape[-1]
+    along, ends, begins = (np.tile(each, (flights, 1)) for each in (way.way, way.ends, way.begins))
+    run, rise = np.hypot(along[:, 0], along[:, 1]), along[:, 2]
+    length = np.hypot(run, rise)
+    speed = length / _summed(part_s, way.leg, count).ravel()
+    upward = np.full(len(length), vehicle.vertical_accel_m_s2)
+    accel = along_slope(run, rise, np.full(len(length), FULL_ACCEL * vehicle.accel_m_s2), upward, upward)
+    flown = curves(length, speed, accel, vehicle.leg_jerk_m_s3)
+    joint = np.arange(1, len(length))
+    joint = joint[joint % count > 0]  # where the leg with this number follows one without a stop
+    turns = _Turns.between(flown, (ends, begins), speed, vehicle, joint)
+    overlap, slow = np.zeros(len(length) - 1), np.full(len(length), REST_M_S)
+    overlap[joint - 1], turned_m_s = _overlaps(turns)
+    slow[joint] = np.maximum(turned_m_s, REST_M_S)
+    lag = LAG_S * np.maximum(np.log(np.maximum(flown.peak_m_s / slow, 1.0)) - LAG_FROM, 0.0)
+    return flown, overlap, lag
 
 
 def curved(
@@ -396,20 +403,22 @@ def _steps(lag: Floats) -> Floats:
     return np.column_stack([after - lag, after]).ravel()
 
 
-def _overlaps(turns: _Turns) -> Floats:
-    """(T,) for how many seconds the leg before each turn is still flown when the next begins."""
+def _overlaps(turns: _Turns) -> tuple[Floats, Floats]:
+    """(T,) for how many seconds the leg before each turn is still flown when the next begins, and (T,) the speed in
+    the middle of the turn."""
     found = turns.most_s.copy()
     excess = turns.excess(found)
     left = np.flatnonzero(excess > 0.0)
     if len(left):
         found[left] = _zero(turns.of(left).excess, found[left], excess[left])
     # Accelerations rise and fall again. The vehicle waits until all is right: the latest is the earliest in time.
-    if turns.gentle(found[None]).all():
-        return found
+    middle = turns.middle(found)
+    if turns.gentle(middle).all():
+        return found, turns.speed_m_s(middle)
     low, high = np.zeros_like(found), found
     for _ in range(_ROUNDS):
-        low, high = _latest(low, high, turns.gentle)
-    return low
+        low, high = _latest(low, high, lambda tried: turns.gentle(turns.middle(tried)))
+    return low, turns.speed_m_s(turns.middle(low))
 
 
 def _zero(excess: Callable[[Floats], Floats], high: Floats, above: Floats) -> Floats:
@@ -479,26 +488,26 @@ class _Turns:
     def excess(self, overlap: Floats) -> Floats:
         """(T,) above 0 where the middle of a turn is too far from the way point, or too fast; it rises with the
         overlap, nearly evenly, because distances rise as its cube and speeds as its square."""
-        (_, v, s), (_, w, r) = self._middle(overlap)
+        (_, v, s), (_, w, r) = self.middle(overlap)
         far = np.sqrt(np.maximum(s * s + r * r - 2.0 * s * r * self._cosine, 0.0)) / CORNER_M
         fast = np.sqrt(np.maximum(v * v + w * w + 2.0 * v * w * self._cosine, 0.0)) / (self.slower_m_s * (1.0 + 1e-6))
         return np.asarray(np.maximum(np.cbrt(far), np.sqrt(fast)) - 1.0)
 
-    def speed_m_s(self, overlap: Floats) -> Floats:
-        """(..., T) the speed in the middle of each turn."""
-        (_, v, _), (_, w, _) = self._middle(overlap)
+    def speed_m_s(self, middle: tuple[Begun, Begun]) -> Floats:
+        """(..., T) the speed in the ``middle`` of each turn."""
+        (_, v, _), (_, w, _) = middle
         return np.asarray(np.sqrt(np.maximum(v * v + w * w + 2.0 * v * w * self._cosine, 0.0)))
 
-    def gentle(self, overlap: Floats) -> Bools:
-        """(K, T) whether the accelerations in the middle of each turn are small enough."""
-        (a, _, _), (b, _, _) = self._middle(overlap)
+    def gentle(self, middle: tuple[Begun, Begun]) -> Bools:
+        """(..., T) whether the accelerations in the ``middle`` of each turn are small enough."""
+        (a, _, _), (b, _, _) = middle
         bend = b[..., None] * self.out - a[..., None] * self.into
         across = np.hypot(bend[..., 0], bend[..., 1]) < CORNER_ACCEL * self.vehicle.corner_accel_m_s2 * (1.0 + 1e-6)
         return np.asarray(across & (np.abs(bend[..., 2]) < self.vehicle.vertical_accel_m_s2 * (1.0 + 1e-6)))
 
-    def _middle(self, overlap: Floats) -> tuple[Begun, Begun]:
+    def middle(self, overlap: Floats) -> tuple[Begun, Begun]:
         """Acceleration, speed and metres of both legs, from the end of one and the start of the other, in the middle
-        of overlaps (K, T)."""
+        of overlaps (..., T)."""
         half = 0.5 * overlap
         a, v, s = self.pairs.begun(np.concatenate([half, half], axis=-1))
         n = len(self.slower_m_s)

@@ -30,6 +30,7 @@ class Curves:
     """N legs, each (N,): length, peaks of jerk, acceleration and speed, and seconds of three risings.
 
     ``rise_s``: of the jerk to its peak. ``ramp_s``: of the acceleration. ``start_s``: of the speed, from rest.
+    ``half_ramp_m``: metres flown in the first half of the ramp.
     """
 
     length_m: Floats
@@ -39,6 +40,7 @@ class Curves:
     ramp_s: Floats
     start_s: Floats
     peak_m_s: Floats
+    half_ramp_m: Floats
 
     @property
     def time_s(self) -> Floats:
@@ -70,27 +72,27 @@ class Curves:
         """Acceleration, speed and metres in the first half of the start: the ramp, and the constant acceleration."""
         ramp = self.ramp_s
         over, rest = np.maximum(t - ramp, 0.0), np.maximum(ramp - t, 0.0)
-        accel, speed, gone = self._jerked(np.minimum(np.minimum(t, rest), 0.5 * ramp))
+        accel, speed, gone = _jerked(np.minimum(np.minimum(t, rest), 0.5 * ramp), self.jerk_m_s3, self.rise_s)
         half_speed = 0.5 * self.accel_m_s2 * ramp
-        middle = self._jerked(0.5 * ramp)[2]
-        whole = 2.0 * middle + 0.125 * self.accel_m_s2 * ramp**2
+        whole = 2.0 * self.half_ramp_m + 0.125 * self.accel_m_s2 * ramp**2
         second = t > 0.5 * ramp
         gone = np.where(second, whole - half_speed * rest + 0.5 * self.accel_m_s2 * rest**2 - gone, gone)
         speed = np.where(second, half_speed - self.accel_m_s2 * rest + speed, speed)
         accel = np.where(second, self.accel_m_s2 - accel, accel)
         return accel, speed + self.accel_m_s2 * over, gone + half_speed * over + 0.5 * self.accel_m_s2 * over**2
 
-    def _jerked(self, t: Floats) -> Begun:
-        """Acceleration, speed and metres in the first half of the ramp: the jerk rises, then holds."""
-        half, turn = 0.5 * self.jerk_m_s3, math.pi / self.rise_s
-        u = np.minimum(t, self.rise_s)
-        sine, cosine = np.sin(turn * u), np.cos(turn * u)
-        accel = half * (u - sine / turn)
-        speed = half * (0.5 * u**2 + (cosine - 1.0) / turn**2)
-        gone = half * (u**3 / 6.0 + sine / turn**3 - u / turn**2)
-        x = t - u
-        gone = gone + speed * x + 0.5 * accel * x**2 + self.jerk_m_s3 * x**3 / 6.0
-        return accel + self.jerk_m_s3 * x, speed + accel * x + half * x**2, gone
+
+def _jerked(t: Floats, jerk_m_s3: Floats, rise_s: Floats) -> Begun:
+    """Acceleration, speed and metres in the first half of the ramp: the jerk rises, then holds."""
+    half, turn = 0.5 * jerk_m_s3, math.pi / rise_s
+    u = np.minimum(t, rise_s)
+    sine, cosine = np.sin(turn * u), np.cos(turn * u)
+    accel = half * (u - sine / turn)
+    speed = half * (0.5 * u**2 + (cosine - 1.0) / turn**2)
+    gone = half * (u**3 / 6.0 + sine / turn**3 - u / turn**2)
+    x = t - u
+    gone = gone + speed * x + 0.5 * accel * x**2 + jerk_m_s3 * x**3 / 6.0
+    return accel + jerk_m_s3 * x, speed + accel * x + half * x**2, gone
 
 
 def along_slope(run_m: Floats, rise_m: Floats, level: Floats, up: Floats, down: Floats) -> Floats:
@@ -122,7 +124,8 @@ def curves(length_m: Floats, speed_m_s: Floats, accel_m_s2: Floats, jerk_m_s3: f
         speed_m_s / accel - ramp, 0.5 * (np.sqrt(ramp**2 + 8.0 * half_m / accel) - 3.0 * ramp)
     )  # fmt: skip
     steady = np.maximum(steady, 0.0)
-    return Curves(length_m, jerk, accel, rise, ramp, 2.0 * ramp + steady, accel * (ramp + steady))
+    half_ramp_m = _jerked(0.5 * ramp, jerk, rise)[2]
+    return Curves(length_m, jerk, accel, rise, ramp, 2.0 * ramp + steady, accel * (ramp + steady), half_ramp_m)
 
 
 def _accel_by_length(half_m: Floats, jerk: Floats, rise: Floats) -> Floats:
