@@ -44,7 +44,7 @@ MIDDLE_DEG = 36.6, -84.3
 FORECAST_HOURS = [f"2026-11-28T{hour:02d}:00" for hour in range(9, 15)]
 FORECAST_AGL_M = 10, 80, 120
 BATTERY_J = 1e7
-MOST_SHOWN = 20
+MOST_REASONS = 20
 """Most faults, and refusals, that a report in words has."""
 RUNS_OF_FLEET = 5
 GATES = (1, 2, 3, "auto")
@@ -52,7 +52,7 @@ DEPARTURE = datetime(2026, 11, 28, 10, 0, 0, tzinfo=UTC)
 """The common start of a fleet with gates, which is within the forecasts."""
 LANES_APART_DEG = 0.008
 """Distance of the starts, and of the goals, of neighbours in a fleet: 710 m or more, as wings circle at their goals."""
-Refusal = tuple[str, str, str]
+NotPlanned = tuple[str, str, str]
 """Which mission is refused, the kind of the reason, and the reason in words."""
 ENERGY_SLACK = 1.002
 """Simulated motion and planned motion take the same energy up to this factor in still air."""
@@ -65,7 +65,7 @@ def run(
     if not 1 <= flights <= MOST_FLIGHTS or not 0 <= beyond <= MOST_FLIGHTS:
         raise InputError(f"give 1 to {MOST_FLIGHTS} flights and at most as many beyond, not {flights} and {beyond}")
     rows: dict[str, Counter[str]] = {}
-    refusals: list[Refusal] = []
+    refusals: list[NotPlanned] = []
     faults: list[str] = []
     outside: Counter[str] = Counter()
     number = flown = blown = 0
@@ -100,7 +100,7 @@ def run_fleets(fleets: int, *, seed: int = 1, tell: Callable[[str], None] | None
     if not 1 <= fleets <= MOST_FLIGHTS:
         raise InputError(f"give 1 to {MOST_FLIGHTS} fleets, not {fleets}")
     rows: dict[str, Counter[str]] = {}
-    refusals: list[Refusal] = []
+    refusals: list[NotPlanned] = []
     faults: list[str] = []
     for number in range(1, fleets + 1):
         with TemporaryDirectory() as folder:
@@ -130,7 +130,7 @@ def run_fleets(fleets: int, *, seed: int = 1, tell: Callable[[str], None] | None
 
 
 def _planned(
-    document: dict[str, Any], named: str, refusals: list[Refusal], start: datetime | None = None
+    document: dict[str, Any], named: str, refusals: list[NotPlanned], start: datetime | None = None
 ) -> Plan | None:
     """The plan of a mission that passes, with a common start or without; None, and why, of any other."""
     try:
@@ -147,7 +147,7 @@ def _planned(
     return planned
 
 
-def _refused(refusals: Sequence[Refusal]) -> dict[str, Any]:
+def _refused(refusals: Sequence[NotPlanned]) -> dict[str, Any]:
     """How many are refused for each kind of reason, and the reason of each."""
     return {
         "refused": dict(Counter(kind for _, kind, _ in refusals)),
@@ -364,10 +364,10 @@ def report_fleets(result: dict[str, Any]) -> str:
 
 
 def _faults_and_refusals(result: dict[str, Any]) -> list[str]:
-    """Faults and refusals, `MOST_SHOWN` of each at most."""
+    """Faults and refusals, `MOST_REASONS` of each at most."""
     lines = []
     for word, found in (("fault", result["faults"]), ("refused", result["refusals"])):
-        lines += [f"{word}: {one}" for one in found[:MOST_SHOWN]]
-        if len(found) > MOST_SHOWN:
-            lines.append(f"{word}: {len(found) - MOST_SHOWN} more (--json has all)")
+        lines += [f"{word}: {one}" for one in found[:MOST_REASONS]]
+        if len(found) > MOST_REASONS:
+            lines.append(f"{word}: {len(found) - MOST_REASONS} more (--json has all)")
     return lines

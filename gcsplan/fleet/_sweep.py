@@ -35,7 +35,7 @@ DRIFTS_AT_ONCE = 4_000_000
 Apart = tuple[float | Floats, float | Floats]
 """The least and the most of a difference of two times, s, for each row or for all."""
 
-NEARER = 2
+REACH_ROUNDS = 2
 """Times that the pieces about each slice are found: by a vehicle's whole reach, then by that of these pieces."""
 
 SLACK_M = 1e-7
@@ -278,7 +278,7 @@ class Fleet:
             speed, early, late = np.sqrt((piece.velocity**2).sum(axis=1)), *piece.off_s(window_s)
             off = np.maximum(np.abs(early), np.abs(late)) + np.zeros(len(speed))
             near[v] = reach_s[v]
-            for _ in range(NEARER):  # a place of the time table within the reach has a reach of its own
+            for _ in range(REACH_ROUNDS):  # a place of the time table within the reach has a reach of its own
                 low = np.searchsorted(piece.from_s, edges[:-1] - near[v], side="right") - 1
                 high = np.searchsorted(piece.from_s, edges[1:] + near[v], side="left") - 1
                 high[-1] = np.searchsorted(piece.from_s, edges[-1] + near[v, -1], side="right") - 1  # with the stay

@@ -47,9 +47,9 @@ def test_lost_intervals_are_counted_and_only_broken_words_are_faults() -> None:
 
 
 def test_a_report_shows_some_refusals_and_how_many_more_there_are() -> None:
-    why = [f"fleet {k}: too late" for k in range(wind.MOST_SHOWN + 5)]
+    why = [f"fleet {k}: too late" for k in range(wind.MOST_REASONS + 5)]
     words = wind.report_fleets({"fleets": len(why), "refused": {}, "refusals": why, "faults": [], "kinds": {}})
-    assert words.count("too late") == wind.MOST_SHOWN
+    assert words.count("too late") == wind.MOST_REASONS
     assert "refused: 5 more" in words
 
 
