@@ -36,7 +36,7 @@ Apart = tuple[float | Floats, float | Floats]
 """The least and the most of a difference of two times, s, for each row or for all."""
 
 REACH_ROUNDS = 2
-"""Times that the pieces about each slice are found: by a vehicle's whole reach, then by that of these pieces."""
+"""Times that the pieces about each slice are found: by a vehicle's whole reach, then by the reach of what was found."""
 
 SLACK_M = 1e-7
 """Metres by which rounding may falsify a bound, and so the largest distance error of the search."""
