@@ -268,7 +268,7 @@ def upload(
 
     options = UploadOptions(
         allow_armed=allow_armed, ignore_position=ignore_position, allow_parameters=allow_parameters, atomic=atomic,
-        timeout_s=timeout_s,
+        timeout_s=float(timeout_s),
     )  # fmt: skip
     return uploads.run_jobs(
         uploads.jobs_of(planned, targets, homes, bool(homes)), options, progress, simulator=loopback_fleet
@@ -341,7 +341,7 @@ def verify(
     if source is not None and not isinstance(source, MissionFile):
         source = load_mission(source)
     return uploads.verify_file(
-        os.fspath(file), url, sysid, source=source, tolerance_m=tolerance_m, timeout_s=timeout_s,
+        os.fspath(file), url, sysid, source=source, tolerance_m=tolerance_m, timeout_s=float(timeout_s),
         allow_parameters=allow_parameters,
     )  # fmt: skip
 
@@ -356,8 +356,8 @@ def download(
     """
     require("download", url=url, file=file, sysid=sysid, timeout_s=timeout_s)
     if file is None:
-        return uploads.mission_on_board(url, sysid, f"vehicle {sysid}", timeout_s=timeout_s)
-    return uploads.download_to(url, sysid, Path(file), timeout_s=timeout_s)
+        return uploads.mission_on_board(url, sysid, f"vehicle {sysid}", timeout_s=float(timeout_s))
+    return uploads.download_to(url, sysid, Path(file), timeout_s=float(timeout_s))
 
 
 def clear(
@@ -368,7 +368,7 @@ def clear(
     Raises VehicleRefused, LinkError, and UsageError for another ``kind``.
     """
     require("clear", url=url, kind=kind, sysid=sysid, allow_armed=allow_armed, timeout_s=timeout_s)
-    uploads.clear(url, sysid, kind, allow_armed=allow_armed, timeout_s=timeout_s)
+    uploads.clear(url, sysid, kind, allow_armed=allow_armed, timeout_s=float(timeout_s))
 
 
 def new(

@@ -40,13 +40,13 @@ _BOUNDS = ("minimum", "maximum", "exclusiveMinimum", "exclusiveMaximum")
 
 @cache
 def descriptions() -> dict[tuple[str, str], str]:
-    """Class and key to the line below the key, in the modules of the keys."""
+    """Class and key to the text below the key, as one line, in the modules of the keys."""
     found = {}
     for kind in [*ast.parse(inspect.getsource(schema)).body, *ast.parse(inspect.getsource(point_keys)).body]:
         if isinstance(kind, ast.ClassDef):
             for field, text in zip(kind.body, kind.body[1:], strict=False):
                 if isinstance(field, ast.AnnAssign) and isinstance(text, ast.Expr):
-                    found[kind.name, ast.unparse(field.target)] = ast.literal_eval(text.value)
+                    found[kind.name, ast.unparse(field.target)] = " ".join(ast.literal_eval(text.value).split())
     return found
 
 

@@ -57,13 +57,13 @@ EXPECTED: dict[str, tuple[Any, str]] = {
 """The type of each argument by its name, and what it is in words."""
 
 NEEDED = {"planned", "folder", "what", "runs", "gusts_m_s", "noise_m", "timeout_s", "to", "url", "sysid",
-          "start", "goal", "min_agl_m", "kind", "autopilot", "mirror"}  # fmt: skip
-"""Arguments that cannot be None."""
+          "start", "goal", "min_agl_m", "kind", "autopilot", "mirror", ("verify", "file")}  # fmt: skip
+"""Arguments that cannot be None, of all functions or of one."""
 
 
 def require(function: str, **given: object) -> None:
     """Raise UsageError unless each argument is of its type, or None where it may be; True and False are no numbers."""
     for name, value in given.items():
         kind, expected = EXPECTED[name]
-        if value is not None or name in NEEDED:
+        if value is not None or name in NEEDED or (function, name) in NEEDED:
             require_kind(f"{function}()", name, value, kind, expected)
