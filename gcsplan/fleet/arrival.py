@@ -221,8 +221,7 @@ class Craft:
         """
         if not self.vehicle.keeps_airspeed:
             return None
-        round_m = math.tau * self.vehicle.turn_radius_m
-        round_m *= float(true_per_indicated(self.crew.route.points[-1:, 2])[0])
+        round_m = math.tau * self.vehicle.turn_radius_m * float(true_per_indicated(self.crew.route.points[-1:, 2])[0])
         return round_m / self.slowest_m_s, round_m / self.fastest_m_s
 
     def latest_s(self, hold: Hold) -> float:

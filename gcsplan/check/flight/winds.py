@@ -18,7 +18,7 @@ from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.check.flight.times import FlightTimes, Parts
 from gcsplan.check.motion.stretch import Stretch
 from gcsplan.figures import floored
-from gcsplan.fleet.motion.ardupilot import leaning_m_s
+from gcsplan.fleet.motion.ardupilot import MOST_TILT_DEG, leaning_m_s
 from gcsplan.vehicle import AIRSPEED_SPARE, Vehicle
 from gcsplan.wind.ability import ADVANCES_M_S, Ability, WindsAlong, circle_ratio, winds_within
 from gcsplan.wind.declared import DeclaredWind, FlightWind
@@ -84,7 +84,8 @@ def air_m_s(vehicle: Vehicle, speed_m_s: Floats, slopes: Floats, amsl_m: Floats)
     """(P,) the least and the most that a vehicle's airspeed is bounded by, where its way through the air rises by a
     slope between two, ``slopes`` (P, 2).
 
-    A fixed wing keeps its true airspeed. Others lean: at one of both slopes they are slowest, at the other fastest.
+    A fixed wing keeps its true airspeed. Others lean: the steeper they climb, the faster they are, up to the slope of
+    `MOST_TILT_DEG`, and slower beyond it.
     """
     if vehicle.keeps_airspeed:
         true = speed_m_s * true_per_indicated(amsl_m)
@@ -92,7 +93,8 @@ def air_m_s(vehicle: Vehicle, speed_m_s: Floats, slopes: Floats, amsl_m: Floats)
     if vehicle.largest_lean_deg is None:
         most = np.full(len(amsl_m), AIRSPEED_SPARE * vehicle.speed_max_m_s)
         return most, most
-    slant = np.arctan(slopes)
+    fastest = math.tan(math.radians(MOST_TILT_DEG - vehicle.largest_lean_deg))
+    slant = np.arctan(np.column_stack([slopes, np.clip(fastest, slopes.min(axis=1), slopes.max(axis=1))]))
     each = leaning_m_s(vehicle.largest_lean_deg, slant, amsl_m[:, None]) * np.cos(slant)
     return each.min(axis=1), each.max(axis=1)
 
@@ -477,16 +479,15 @@ class FlightInWind:
     @cached_property
     def _circles(self) -> Bools:
         """(N,) whether a stretch is a fixed wing's circle that it leaves again."""
-        wing = self.vehicle.keeps_airspeed
-        return np.array([wing and s.reach_m > 0.0 and s.start == s.end and math.isfinite(s.hold_s)
-                         for s in self.stretches])  # fmt: skip
+        left = [s.reach_m > 0.0 and s.start == s.end and math.isfinite(s.hold_s) for s in self.stretches]
+        return np.array(left, dtype=np.bool_) & self.vehicle.keeps_airspeed
 
     @cached_property
     def _stays(self) -> Bools:
         """(N,) whether it keeps a place, or a circle, on a stretch or at its end."""
         wing = self.vehicle.keeps_airspeed
         stays = [(s.hold_s > 0.0 and (not wing or s.reach_m > 0.0)) or (s.column and not wing) for s in self.stretches]
-        return np.array(stays) | self._circles
+        return np.array(stays, dtype=np.bool_) | self._circles
 
     def _places(self, wind: DeclaredWind) -> WindsAlong:
         """The winds over the stretches' places, at any hour of the flight."""
@@ -516,13 +517,13 @@ class FlightInWind:
         """What the vehicle can do on the parts in the winds of a set, with gusts.
 
         A multicopter that leans its most rises through the air by the slope of its leg times its speed over ground per
-        airspeed. Two at most, for it keeps its place in these winds; and each range of airspeeds gives one of slopes.
+        airspeed. That is two at most where it keeps its place, and `_cannot` finds the winds in which it does not. Each
+        range of airspeeds gives a nearer one of slopes.
         """
-        able, rise = self._ability, self._rise
+        able, rise, middle_m = self._ability, self._rise, self._amsl_m.mean(axis=1)
         if self.vehicle.largest_lean_deg is None or not rise.any():
             return able
         per_air = np.tile([0.0, 2.0], (len(rise), 1))
-        middle_m = self._amsl_m.mean(axis=1)
         for _ in range(_SLOPE_ROUNDS):
             least, most = air_m_s(self.vehicle, self._parts.speed_m_s, rise[:, None] * per_air, middle_m)
             able = replace(able, least_air_m_s=least, most_air_m_s=most)

@@ -38,7 +38,7 @@ from gcsplan.fleet.motion.speeds import POSITION_ERROR_M, bounds
 from gcsplan.vehicle import COPTER_CORNER_ACCEL, COPTER_PEAK_ACCEL, LARGEST_LEAN_DEG, Autopilot, Vehicle
 from gcsplan.world.geodesy.atmosphere import density_ratio
 
-__all__ = ["CORNER_M", "Curved", "curved", "lean_needed_deg", "leaning_m_s", "trailing_s"]
+__all__ = ["CORNER_M", "MOST_TILT_DEG", "Curved", "curved", "lean_needed_deg", "leaning_m_s", "trailing_s"]
 
 BODY, ROTORS = 0.003627, 0.02532
 """Drag at sea level per weight, of the body at 1 m/s, and of the rotors at 1 m/s with a thrust of one weight."""
@@ -71,6 +71,9 @@ LAST_FLOWN = 16
 """Last speeds on stretches whose legs are kept: a search for a speed asks again for the two ends of its range, and the
 motion at the speed that it found is made next."""
 
+MOST_TILT_DEG = 80.0
+"""Most degrees between the rotors' plane and the way through the air; on a steeper way a copter is slower."""
+
 _TRIED, _ROUNDS = 16, 3
 _STEPS, _WITHIN = 30, 1e-6
 _HALVINGS = 60
@@ -86,7 +89,7 @@ def leaning_m_s(lean_deg: float | Floats, slope_rad: Floats, amsl_m: Floats) -> 
     """
     thin = density_ratio(amsl_m)
     lean = np.radians(lean_deg)
-    tilt = np.clip(lean + slope_rad, None, np.radians(80.0))
+    tilt = np.clip(lean + slope_rad, None, np.radians(MOST_TILT_DEG))
     lift, push, rise, body = np.cos(lean), 2.0 * np.sin(lean), np.tan(tilt), BODY * thin
     drag = 4.0 * BODY * thin * np.sin(lean)
     thrust = np.ones_like(tilt)

@@ -114,8 +114,7 @@ def most_bytes(name: str) -> int:
     }.get(ending)  # fmt: skip
     kinds = (("a mission", VEHICLE_FILES), ("zones", _zone_endings()), ("terrain", TERRAIN_FILES))
     read = "; ".join(f"{kind}: {', '.join(dict.fromkeys(of_kind))}" for kind, of_kind in kinds)
-    other = other or f"files that end so are not read. Drop {read}"
-    raise InputError(other, where=name)
+    raise InputError(other or f"files that end so are not read. Drop {read}", where=name)
 
 
 class Receiving:

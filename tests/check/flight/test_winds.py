@@ -19,6 +19,7 @@ from gcsplan.check.flight.winds import (
     COUPLED,
     COUPLED_SMOOTH,
     UNEVEN_S,
+    air_m_s,
     gust_length_m,
 )
 from gcsplan.check.judge import judge
@@ -249,6 +250,19 @@ def test_a_long_climb_through_a_profile_counts_the_wind_at_each_height(heights: 
     assert earliest_s - begins_s <= flown_s * 1.001
     assert latest_s - begins_s >= flown_s * 0.999
     assert latest_s - earliest_s <= 0.04 * flown_s
+
+
+@given(st.floats(10.0, 80.0), st.floats(-2.5, 2.5), st.floats(0.0, 2.5), st.floats(0.0, 1.0))
+def test_no_airspeed_on_a_slope_between_two_is_beyond_its_bounds(
+    lean_deg: float, low: float, wide: float, part: float
+) -> None:
+    craft = replace(vehicle(), lean_angle_deg=lean_deg)
+    speed, amsl_m = np.array([12.0]), np.array([400.0])
+    least, most = air_m_s(craft, speed, np.array([[low, low + wide]]), amsl_m)
+    slope = low + part * wide
+    found, _ = air_m_s(craft, speed, np.array([[slope, slope]]), amsl_m)
+    assert least[0] <= found[0] * (1.0 + 1e-6)
+    assert found[0] <= most[0] * (1.0 + 1e-6)
 
 
 @pytest.mark.parametrize(("from_deg", "rise_m"), [(90, 80), (270, 80), (90, -80), (270, -80)])
