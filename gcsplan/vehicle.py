@@ -29,6 +29,12 @@ LEAN_DEG_PER_M_S = 3.0
 """Lean that an ArduCopter needs for 1 m/s of cruise speed, against its drag: its speed was measured to end near 10 m/s
 with 30° and near 15 m/s with 45°, whatever was commanded. An airframe with less drag is faster."""
 
+LIFTS_M_S = 2.5, 1.5
+"""Rates at which an ArduPlane VTOL's lift motors carry it up and down: the defaults of Q_WP_SPEED_UP, Q_WP_SPEED_DN."""
+
+BRAKES_M_S2 = 2.0
+"""How hard it brakes for its landing: the default of Q_TRANS_DECEL."""
+
 PX4_VEL_MAX_M_S = 12.0
 """PX4's MPC_XY_VEL_MAX, default: it flies no faster, whatever is commanded, and says nothing."""
 
@@ -174,7 +180,8 @@ class Vehicle:
     each of so many courses, evenly all around from east to north; of a fixed wing, whose `limits` then hold over ground
     in every one of these winds; empty: still air. ``climbs_deg``: its steepest climb through the air;
     None: `limits` has it. ``return_m_s``, ``return_wait_s``: the speed of the autopilot's own
-    return and its wait over home, if they are not the defaults.
+    return and its wait over home, if they are not the defaults. ``vtol``: an ArduPlane that takes off and lands
+    vertically, and flies on its wing in between, with its turn radius.
     """
 
     name: str
@@ -200,6 +207,7 @@ class Vehicle:
     return_wait_s: float | None = None
     blows_m_s: tuple[float, ...] = ()
     climbs_deg: float | None = None
+    vtol: bool = False
 
     @property
     def wind_m_s(self) -> float:
@@ -282,7 +290,7 @@ class Vehicle:
 
     @property
     def keeps_airspeed(self) -> bool:
-        """Whether its speed is the airspeed that it indicates, along its path: a fixed wing's."""
+        """Whether its speed is the airspeed that it indicates, along its path: a fixed wing's, a VTOL's too."""
         return self.autopilot is Autopilot.ARDUPLANE and self.turn_radius_m > 0.0
 
     @property

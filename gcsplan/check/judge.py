@@ -16,7 +16,7 @@ from itertools import pairwise
 import numpy as np
 
 from gcsplan.arrays import Floats, Indices
-from gcsplan.check.fixed_wing.ends import slant_findings
+from gcsplan.check.fixed_wing.ends import is_wing, slant_findings
 from gcsplan.check.flight.corners import round_corners
 from gcsplan.check.flight.follow import follow_in
 from gcsplan.check.flight.times import FlightTimes, spare_s
@@ -164,7 +164,7 @@ def _missed_gates(flight: Flight, seconds: Floats, blown: FlightInWind | None) -
 
 def _judged_in_wind(flight: Flight, vehicle: Vehicle, wind: FlightWind) -> bool:
     """Whether it is known what the vehicle does in a wind; why not, if not."""
-    if not wind.declared.still and vehicle.autopilot is Autopilot.ARDUPLANE and not vehicle.keeps_airspeed:
+    if not wind.declared.still and vehicle.autopilot is Autopilot.ARDUPLANE and not is_wing(vehicle):
         flight.not_judged.append(Note("vtol_in_wind"))
         return False
     return True

@@ -458,9 +458,9 @@ class _MissionReading:
                 self.problems.append(
                     Mistake(f"{at}.autopilot", "px4 flies no terrain frame; use altitude_frame: relative or amsl")
                 )
-            if altitude_frame == "terrain" and keys.turn_radius_m > 0.0:
-                words = "a fixed wing's turns are planned above home or sea level: use altitude_frame: relative or amsl"
-                self.problems.append(Mistake(f"{at}.turn_radius_m", words))
+            if altitude_frame == "terrain" and keys.autopilot == "arduplane":
+                words = "an arduplane's turns are planned above home or sea level: use altitude_frame: relative or amsl"
+                self.problems.append(Mistake(f"{at}.autopilot", words))
             start = make_place(keys.start, f"{at}.start", self.problems, self.notes, local=self.local)
             goal = make_place(keys.goal, f"{at}.goal", self.problems, self.notes, local=self.local)
             via = make_places(keys.via, f"{at}.via", self.problems, self.notes, local=self.local)

@@ -104,6 +104,7 @@ def make_vehicle(
     before = len(problems)
     limits = _limits(keys, shared, where, problems, notes, local=local)
     slow, fast = keys.speed_m_s
+    keys, vtol = _on_its_wing(keys, where, problems)
     if slow > fast:
         words = f"the slowest speed must not be above the fastest, given [{slow:g}, {fast:g}]"
         problems.append(Mistake(f"{where}.speed_m_s", words))
@@ -119,16 +120,35 @@ def make_vehicle(
         )
     if limits is not None:
         _check_heights(keys, limits, where, problems, obstacle_m)
-    climb_out = _climb_out(keys, limits, where, problems)
+    climb_out = _climb_out(keys, limits, where, problems, vtol=vtol)
     energy = make_energy(keys, where, problems, notes)
     if len(problems) > before or limits is None:
         return None
     return Vehicle(
         name=keys.name, sysid=keys.sysid, autopilot=Autopilot(keys.autopilot), limits=limits,
         speed_min_m_s=slow, speed_max_m_s=fast, turn_radius_m=keys.turn_radius_m,
-        energy=energy, link=keys.link, climb_out=climb_out,
-        **(_wing_motion(keys, limits) if keys.turn_radius_m > 0.0 else _motion(keys, local=local)),
+        energy=energy, link=keys.link, climb_out=climb_out, vtol=vtol,
+        **(_wing_motion(keys, limits, vtol=vtol) if keys.turn_radius_m > 0.0 else _motion(keys, local=local)),
     )  # fmt: skip
+
+
+VTOL_BANK_DEG = 30.0
+"""The bank of a VTOL's turns at its fastest speed, if its radius is not given."""
+
+
+def _on_its_wing(keys: VehicleKeys, where: str, problems: list[Mistake]) -> tuple[VehicleKeys, bool]:
+    """The keys with the radius of a VTOL's turns, and whether the vehicle is a VTOL: in a mission ArduPlane flies its
+    way points on its wing, whatever it takes off with (quadplane.cpp, `in_vtol_auto`)."""
+    plane, radius_m = keys.autopilot == "arduplane", keys.turn_radius_m
+    if keys.vtol is not None and (not plane or not (keys.vtol or radius_m)):
+        cure = "give its turn_radius_m" if plane else "leave it out, or use autopilot: arduplane"
+        problems.append(Mistake(f"{where}.vtol", f"{cure}, given {str(keys.vtol).lower()} for {keys.autopilot}"))
+    vtol = plane and (not radius_m if keys.vtol is None else keys.vtol)
+    if vtol and not radius_m:
+        radius_m = math.ceil(keys.speed_m_s[1] ** 2 / GRAVITY_M_S2 / math.tan(math.radians(VTOL_BANK_DEG)))
+    if vtol and keys.climb_out != "straight":
+        problems.append(Mistake(f"{where}.climb_out", "a VTOL takes off vertically: leave it out, given circles"))
+    return keys.model_copy(update={"turn_radius_m": radius_m}), vtol
 
 
 WIND_COURSES = 72
@@ -256,7 +276,9 @@ def _check_wing(keys: VehicleKeys, limits: Limits | None, where: str, problems: 
         problems.append(Mistake(f"{where}.max_descent_deg", words))
 
 
-def _climb_out(keys: VehicleKeys, limits: Limits | None, where: str, problems: list[Mistake]) -> ClimbOut | None:
+def _climb_out(
+    keys: VehicleKeys, limits: Limits | None, where: str, problems: list[Mistake], *, vtol: bool
+) -> ClimbOut | None:
     """A fixed wing's climb-out, if the file states one; it must not be less steep than its climb-out is judged."""
     rate, speed = keys.climb_out_m_s, keys.climb_out_speed_m_s
     if rate is None:
@@ -267,7 +289,7 @@ def _climb_out(keys: VehicleKeys, limits: Limits | None, where: str, problems: l
                 )
             )
         return None
-    if keys.turn_radius_m <= 0.0:
+    if keys.turn_radius_m <= 0.0 or vtol:
         words = f"is a fixed wing's, which has a turn_radius_m above 0: leave it out, or use climb_m_s, given {rate:g}"
         problems.append(Mistake(f"{where}.climb_out_m_s", words))
         return None
@@ -290,15 +312,18 @@ def _climb_out(keys: VehicleKeys, limits: Limits | None, where: str, problems: l
     return ClimbOut(rate, over_ground)
 
 
-def _wing_motion(keys: VehicleKeys, limits: Limits) -> dict[str, Any]:
-    """Rates of a fixed wing: its speed is constant, so they follow from the slope limits unless they are given."""
+def _wing_motion(keys: VehicleKeys, limits: Limits, *, vtol: bool) -> dict[str, Any]:
+    """Rates of a fixed wing: its speed is constant, so they follow from the slope limits unless they are given. A VTOL
+    takes off and lands with those of a multicopter, and speeds up and brakes in between."""
     fast = keys.speed_m_s[1]
     rates = {
         "climb_m_s": fast * limits.max_climb_slope,
         "descent_m_s": fast * limits.max_descent_slope,
     }
     own = {key: getattr(keys, key) for key in rates if key in keys.model_fields_set}
-    return {key: math.inf for key in MOTION if key.endswith(("_m_s2", "_m_s3"))} | {"land_m_s": math.inf} | rates | own
+    lifts = {key: getattr(keys, key) for key in ("accel_m_s2", "vertical_accel_m_s2", "land_m_s") if vtol}
+    free = {key: math.inf for key in MOTION if key.endswith(("_m_s2", "_m_s3"))} | {"land_m_s": math.inf}
+    return free | lifts | rates | own
 
 
 def unbounded_motion(keys: VehicleKeys, *, local: bool) -> tuple[str, ...]:

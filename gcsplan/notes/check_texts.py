@@ -66,8 +66,20 @@ CHECK_TEXTS = {
         "take-off is written {away_m:distance.0} from home; ArduCopter takes off where it stands"
     ),
     "vtol_in_wind": (
-        "an ArduPlane without {key:turn_radius_m} is taken for a VTOL, which keeps an airspeed between take-off and "
-        "landing: its flight in winds is not judged; give a fixed wing that key"
+        "an ArduPlane without {key:turn_radius_m} is taken for a VTOL, which takes off and lands vertically: its "
+        "flight in winds is not judged; give a fixed wing that key"
+    ),
+    "arcs_without_radius": (
+        "an ArduPlane flies its way points on its wing and swings wide of its corners: they are judged with a "
+        "{key:turn_radius_m} alone"
+    ),
+    "vtol_sets_off": (
+        "a VTOL's take-off is judged as vertical, and the flight as on its wing from there on (Q_ENABLE 1): stand it "
+        "with its nose at {heading_deg:.0f}°, for it sets off where its nose points"
+    ),
+    "vtol_overshoots": (
+        "it brakes for its landing over {brakes_m:distance.0 up} (Q_TRANS_DECEL 2), and its way there is shorter: "
+        "{past_m:distance.0 up} around the place are judged; a way point farther from it takes that away"
     ),
     "vtol_climbs_by_altitude": (
         "ArduPlane's VTOL take-off climbs by its altitude, whatever its frame, unless Q_OPTIONS says otherwise: only "
@@ -258,10 +270,6 @@ CHECK_TEXTS = {
     ),
     "reached_within_default": (
         "it gives no acceptance radius: it counts as reached within NAV_ACC_RAD {radius_m:distance}, {read:read "
-        "from the vehicle|the default}"
-    ),
-    "turn_begun_by_default": (
-        "it gives no acceptance radius: its turn is judged as begun by WP_RADIUS {radius_m:distance}, {read:read "
         "from the vehicle|the default}"
     ),
     "arc_begun_by_default": (

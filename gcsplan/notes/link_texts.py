@@ -206,6 +206,11 @@ LINK_TEXTS = {
     "assumed_return_altitude": "the return altitude, above home{judged:, as judged|}",
     "assumed_return_turns": "turns of the return",
     "assumed_bank": "the bank of its turns at {speed_m_s:speed.1}, and a tenth to steer",
+    "assumed_lift": (
+        "{vtol:take-off and landing are vertical, and the way between is flown on the wing|take-off and landing are on "
+        "the wing}"
+    ),
+    "assumed_brakes": "how a VTOL brakes for its landing",
     "after_radio_loss": "loss of radio control",
     "after_ground_station_loss": "loss of the ground station",
     "after_low_battery": "a low battery",

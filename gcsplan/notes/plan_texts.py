@@ -39,8 +39,8 @@ PLAN_TEXTS = {
     ),
     "via_moved": "via point {via} is moved {aside_m:distance} aside: the climb there is on the spot",
     "flown_as_quadplane": (
-        "arduplane with {key:turn_radius_m} 0 is flown as a VTOL (QuadPlane): vertical take-off and landing; corners "
-        "are cut and the landing place is overshot while braking: {key:track_error_m} must hold both"
+        "it is flown as a VTOL (QuadPlane, Q_ENABLE 1): vertical take-off and landing, and in between on its wing, "
+        "with turns of {radius_m:distance} ({key:turn_radius_m})"
     ),
     "climb_out": (
         "launch it on a heading of {heading_deg:.0f}°: it climbs straight ahead for {far_m:distance.0} to "

@@ -35,6 +35,7 @@ another frame at each item. A family's place is part of its seeds."""
 POSTS_M = 20
 """Spacing of the vehicle's terrain, m: the worlds are too small for one of 100 m."""
 
+WINGED = ("wing", "vtol")
 WING_RADIUS_M, WING_SPEED_M_S = 40.0, 14.0
 STRIP_M = 1000.0
 """Around home, m: nothing stands there in the worlds of fixed wings."""
@@ -110,7 +111,7 @@ def make_ground(rng: np.random.Generator, size_m: float) -> Ground:
 
 def make_case(rng: np.random.Generator, family: str) -> Case | None:
     """A safe mission with loose limits; zones that make it unsafe are left out. None if it is unsafe without zones."""
-    size = 5000.0 if family == "wing" else float(rng.uniform(300.0, 900.0))
+    size = 5000.0 if family in WINGED else float(rng.uniform(300.0, 900.0))
     ground = make_ground(rng, size)
     top = ground.heights
     if rng.random() < 0.4:  # a canopy
@@ -119,15 +120,15 @@ def make_case(rng: np.random.Generator, family: str) -> Case | None:
     frame = Frame(float(rng.uniform(-60.0, 60.0)), float(rng.uniform(-170.0, 170.0)))
     autopilot = {"px4": PX4, "vtol": PLANE, "wing": PLANE}.get(family, COPTER)
     if family in ("circle", "return", "jump", "battery"):
-        autopilot = (COPTER, PLANE if family == "circle" else PX4)[int(rng.integers(0, 2))]
+        autopilot = (COPTER, COPTER if family == "circle" else PX4)[int(rng.integers(0, 2))]
     limits = Limits(
         0.0, horizontal_clearance_m=float(rng.choice([0.0, 2.0, 15.0])),
         track_error_m=float(rng.choice([0.0, 0.5, 3.0, 8.0])), altitude_error_m=float(rng.choice([0.0, 1.0, 5.0])),
     )  # fmt: skip
-    speed = WING_SPEED_M_S if family == "wing" else float(rng.uniform(4.0, 15.0))
-    radius = WING_RADIUS_M if family == "wing" else 0.0
+    speed = WING_SPEED_M_S if family in WINGED else float(rng.uniform(4.0, 15.0))
+    radius = WING_RADIUS_M if family in WINGED else 0.0
     craft = Vehicle(
-        "uav1", 1, autopilot, limits, speed_max_m_s=speed, turn_radius_m=radius,
+        "uav1", 1, autopilot, limits, speed_max_m_s=speed, turn_radius_m=radius, vtol=family == "vtol",
         energy=Energy(120.0, 100.0, hover_w=300.0, battery_j=1e9),
     )  # fmt: skip
     mission = make_mission(rng, family, autopilot, ground, surface, frame)
@@ -172,10 +173,10 @@ def make_mission(
     box = np.array(ground.box).reshape(2, 2) * 0.62
     count = int(rng.integers(2, 6))
     points = np.column_stack([rng.uniform(box[0], box[1], (count + 1, 2)), np.zeros(count + 1)])
-    if family == "wing":
+    if family in WINGED:
         points = _wing_points(rng, box)
     over = float(np.nanmax(surface.top_m)) + rng.uniform(60.0, 90.0)
-    points[:, 2] = over + rng.uniform(0.0, 25.0 if family != "wing" else 4.0, len(points))
+    points[:, 2] = over + rng.uniform(0.0, 25.0 if family not in WINGED else 4.0, len(points))
     home_e7 = [m.degrees_e7(float(x)) for x in frame.to_degrees(*points[0, :2])]
     at_home = frame.to_plane(home_e7[0] / 1e7, home_e7[1] / 1e7)
     datum = float(surface.ground_at(*at_home))
@@ -192,9 +193,8 @@ def make_mission(
             return 0.0
         return float(rng.choice([1.0, 2.0, 5.0, 12.0, 40.0, 120.0]))
 
-    up = cmd.VTOL_TAKEOFF if autopilot is PLANE else cmd.TAKEOFF
     first = np.array([*at_home, points[0, 2]])
-    items = [item(up, first, m.RELATIVE)]
+    items = [item(cmd.TAKEOFF, first, m.RELATIVE)]
     kinds = [kind] * (len(points) - 1)
     if family == "frames":
         kinds = rng.choice([m.RELATIVE, m.GLOBAL, m.TERRAIN], count).tolist()
@@ -203,7 +203,7 @@ def make_mission(
         item(cmd.WAYPOINT, p, k, float(rng.choice([0.0, 0.0, 3.0])), accept())
         for p, k in zip(points[1:], kinds, strict=True)
     ]
-    land = item(cmd.VTOL_LAND if autopilot is PLANE else cmd.LAND, points[-1], m.RELATIVE)
+    land = item(cmd.LAND, points[-1], m.RELATIVE)
     items += way
     if family == "frames" and rng.random() < 0.6:
         circle = (1.0, 0.0, float(rng.choice([20.0, -35.0, 80.0])), 0.0)
@@ -219,13 +219,13 @@ def make_mission(
         middle = 0.5 * (points[0] + points[-1])
         circle = (2.0, 0.0, float(rng.choice([0.0, 20.0, -35.0, 80.0])), 0.0)
         items.insert(2, item(cmd.LOITER_TURNS, middle, kind, *circle))
-    elif family == "wing":
-        items = _wing_items(points, item, ground)
+    elif family in WINGED:
+        items = _wing_items(points, item, upright=family == "vtol")
     elif family == "battery":
         items.append(MissionItem(cmd.DO_JUMP, m.NO_POSITION, (2.0, float(rng.integers(20, 2500)), 0, 0)))
     elif family == "jump":
         items.insert(-1, MissionItem(cmd.DO_JUMP, m.NO_POSITION, (2.0, float(rng.integers(0, 4)), 0, 0)))
-    if not returns and family != "wing":
+    if not returns and family not in WINGED:
         items.append(
             replace(land, z=0.0) if rng.random() < 0.6 else item(cmd.LOITER_UNLIM, points[-1], kind, 0, 0, 25.0)
         )
@@ -243,7 +243,7 @@ def _wing_points(rng: np.random.Generator, box: Floats) -> Floats:
     return np.array(points)
 
 
-def _wing_items(points: Floats, item: Callable[..., MissionItem], ground: Ground) -> list[MissionItem]:
+def _wing_items(points: Floats, item: Callable[..., MissionItem], *, upright: bool) -> list[MissionItem]:
     way = np.diff(points[:, :2], axis=0)
     heading = np.arctan2(way[:, 1], way[:, 0])
     turn = np.abs((np.diff(heading) + np.pi) % (2 * np.pi) - np.pi)
@@ -251,6 +251,8 @@ def _wing_items(points: Floats, item: Callable[..., MissionItem], ground: Ground
     ahead = points[0] + 0.9 * (points[1] - points[0])
     items = [item(cmd.TAKEOFF, np.array([*ahead[:2], points[0, 2]]), m.RELATIVE, 20.0)]
     items += [item(cmd.WAYPOINT, p, m.RELATIVE, 0.0, float(r)) for p, r in zip(points[1:-1], radii, strict=True)]
+    if upright:
+        return [item(cmd.VTOL_TAKEOFF, points[0], m.RELATIVE), *items[1:], item(cmd.VTOL_LAND, points[-1], m.RELATIVE)]
     return [*items, item(cmd.LOITER_UNLIM, points[-1], m.RELATIVE, 0.0, 0.0, WING_RADIUS_M)]
 
 
@@ -280,7 +282,7 @@ def knobs(rng: np.random.Generator, case: Case) -> list[Knob]:
             level: Level | None = getattr(zone, which)
             if level is not None:
                 found.append((f"{which} {level.datum}", moved(k, which), 0.0, far))
-    if case.mission.autopilot is not COPTER and case.family != "wing":
+    if case.mission.autopilot is not COPTER and case.family not in WINGED:
         found.append(("accept", accepted, 1.0, 250.0))
     if any(item.command == cmd.RTL for item in case.mission.items):
         found.append(("return", lambda c, v: replace(c, rtl_m=v), 300.0, -20.0))

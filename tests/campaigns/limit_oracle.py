@@ -9,7 +9,7 @@ violation that it finds is one.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -18,7 +18,7 @@ import numpy as np
 from gcsplan.arrays import Floats
 from gcsplan.mavlink.mission.mission import MissionItem
 from gcsplan.vehicle import Autopilot
-from tests.campaigns.limit_cases import POSTS_M, WING_RADIUS_M, Case
+from tests.campaigns.limit_cases import POSTS_M, WING_RADIUS_M, WINGED, Case
 from tests.oracles.legs import Oracle
 
 STEP_M = 0.25
@@ -132,7 +132,7 @@ class Flight:
     # -- the flight --------------------------------------------------------------------------------------------------
 
     def lines(self) -> Iterator[Line]:
-        if self.case.family == "wing":
+        if self.case.family in WINGED:
             yield from self.wing()
             return
         track, high = self.case.limits.track_error_m, self.case.limits.altitude_error_m
@@ -165,7 +165,7 @@ class Flight:
                     even = self.case.family != "frames"  # a shift is an error of height, which no angle counts
                     yield Line(self.straight(here, edge, item.frame == 10), track, high, angles=even)
                     yield from self.cut(item, begun, here, to, after)
-                begun, circle = self.turn(item, begun, here, to, after), 0.0
+                begun, circle = self.turn(item, begun, to), 0.0
                 before, here, stops = here, to, item.command != 82 and item.params[0] > 0
                 if item.command in CIRCLES:
                     circle = self.radius(item, to[2])
@@ -238,24 +238,15 @@ class Flight:
 
     # -- corners -----------------------------------------------------------------------------------------------------
 
-    def accepts_m(self, item: MissionItem, here: Floats, to: Floats, after: MissionItem | None) -> float:
-        """The distance (m) before a way point at which PX4 or an ArduPlane VTOL turns to the next leg."""
-        if item.command != 16:
-            return 0.0 if self.autopilot is Autopilot.ARDUPLANE else 10.0
-        if self.autopilot is Autopilot.PX4 or item.params[1] > 0:
-            own = min(item.params[1], 255.0) if self.autopilot is Autopilot.ARDUPLANE else item.params[1]
-            return own if own > 0 else 10.0
-        if after is None:
-            return 0.0
-        one, two = (to - here)[:2], (self.target(after, to) - to)[:2]
-        turn = abs((math.atan2(*two) - math.atan2(*one) + math.pi) % (2 * math.pi) - math.pi)
-        return min(90.0, 0.75 * 17.0 / math.pi * self.case.vehicle.speed_max_m_s) * min(1.0, turn / (0.5 * math.pi))
+    def accepts_m(self, item: MissionItem) -> float:
+        """The distance (m) before a way point at which PX4 turns to the next leg."""
+        return item.params[1] if item.command == 16 and item.params[1] > 0 else 10.0
 
-    def turn(self, item: MissionItem, begun: Floats, here: Floats, to: Floats, after: MissionItem | None) -> Floats:
+    def turn(self, item: MissionItem, begun: Floats, to: Floats) -> Floats:
         """Where the vehicle turns to the next leg, having flown straight from its last turn at ``begun``."""
         if self.autopilot is Autopilot.ARDUCOPTER or self.case.family == "terrain":
             return to
-        radius, way = self.accepts_m(item, here, to, after), to - begun
+        radius, way = self.accepts_m(item), to - begun
         far = math.hypot(way[0], way[1])
         part = max(0.0, 1.0 - radius / far) if far > 1e-6 else 0.0
         if self.autopilot is Autopilot.PX4 and abs(way[2]) * (1.0 - part) > 0.8:
@@ -297,6 +288,9 @@ class Flight:
     def wing(self) -> Iterator[Line]:
         limits = self.case.limits
         items = self.case.mission.items
+        if self.case.family == "vtol":
+            yield from self.upright(items)
+            return
         climb = math.tan(math.radians(min(items[0].params[0], limits.max_climb_deg)))
         rise = stored_m(items[0], self.autopilot)
         ahead = self.place(items[0].x, items[0].y) - self.home
@@ -311,6 +305,17 @@ class Flight:
             self.ring(points[-1], abs(items[-1].params[2]) * thin), limits.track_error_m, limits.altitude_error_m,
             angles=False,
         )  # fmt: skip
+
+    def upright(self, items: Sequence[MissionItem]) -> Iterator[Line]:
+        """Up, along arcs, level to the landing and down."""
+        track, high = self.case.limits.track_error_m, self.case.limits.altitude_error_m
+        top = np.array([*self.home, self.datum + stored_m(items[0], self.autopilot)])
+        points = np.array([top, *(self.target(i, top) for i in items[1:])])
+        points[-1, 2] = points[-2, 2]
+        yield Line(self.straight(np.array([*self.home, self.datum]), top), track, high, column=True)
+        yield Line(arcs(points, WING_RADIUS_M), track, high)
+        ground = float(self.case.surface.ground_at(*points[-1, :2]))
+        yield Line(self.straight(points[-1], np.array([*points[-1, :2], ground])), track, high, column=True)
 
 
 def arcs(points: Floats, radius: float) -> Floats:

@@ -59,7 +59,7 @@ def test_corners_that_nobody_judges_are_found(monkeypatch: pytest.MonkeyPatch) -
         """Replace `round_corners`: no corner is cut."""
 
     monkeypatch.setattr(judging, "round_corners", sharp)
-    assert run(FOREVER_S, 3, ("vtol",), most=1, turns=2).unsafe
+    assert run(FOREVER_S, 29, ("px4",), most=1, turns=2).unsafe
 
 
 @pytest.mark.nightly

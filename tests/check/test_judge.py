@@ -33,7 +33,11 @@ def mission_over(
     where: World, points: list[list[float]], craft: Vehicle | None = None, **order: object
 ) -> tuple[Mission, Vehicle]:
     craft = craft or vehicle()
-    return build_mission(Path(np.array(points)), where, craft, HOME_DEG, Order(**order)), craft  # type: ignore[arg-type]
+    made = build_mission(Path(np.array(points)), where, craft, HOME_DEG, Order(**order))  # type: ignore[arg-type]
+    if craft.autopilot is Autopilot.ARDUPLANE:  # a VTOL's
+        upright = {cmd.TAKEOFF: cmd.VTOL_TAKEOFF, cmd.LAND: cmd.VTOL_LAND}
+        made = replace(made, items=tuple(replace(i, command=upright.get(i.command, i.command)) for i in made.items))
+    return made, craft
 
 
 def ideal() -> Vehicle:

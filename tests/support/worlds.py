@@ -36,7 +36,8 @@ def world(
 
 
 def vehicle(autopilot: Autopilot = Autopilot.ARDUCOPTER, **limits: Any) -> Vehicle:
-    """A vehicle with min AGL 60 m, track error 3 m and altitude error 5 m unless ``limits`` change them."""
+    """A vehicle with min AGL 60 m, track error 3 m and altitude error 5 m unless ``limits`` change them; an ArduPlane
+    turns with 40 m."""
     given = {"min_agl_m": 60.0, "track_error_m": 3.0, "altitude_error_m": 5.0}
     return Vehicle(
         "uav1",
@@ -44,4 +45,5 @@ def vehicle(autopilot: Autopilot = Autopilot.ARDUCOPTER, **limits: Any) -> Vehic
         autopilot,
         Limits(**(given | limits)),
         energy=Energy(120.0, 100.0, hover_w=400.0),
+        turn_radius_m=40.0 if autopilot is Autopilot.ARDUPLANE else 0.0,
     )

@@ -222,8 +222,8 @@ def make_problem(
         widen=None if source.wider is None else wider,
         known=known,
     )
-    if vehicle.autopilot is Autopilot.ARDUPLANE and vehicle.turn_radius_m <= 0.0:
-        notes.append(Note("flown_as_quadplane"))
+    if vehicle.vtol:
+        notes.append(Note("flown_as_quadplane", radius_m=vehicle.turn_radius_m))
     return problem, tuple(notes)
 
 

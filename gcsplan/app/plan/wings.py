@@ -23,6 +23,7 @@ from gcsplan.check.fixed_wing.ends import (
     above_slant,
     beside_strip,
     blown_slant,
+    brakes_m,
     circle_missing_m,
     drift_of,
     flared,
@@ -191,6 +192,8 @@ class _EndRules:
         """See `EndJudge.slant_clear`."""
         limits, air = self.problem.limits, self.problem.airspace
         lines = [(ground, top, 0.0)]
+        if self.vehicle.vtol:
+            return column_clear(ground, top, 0.0, limits, air)
         if self.lands_m_s > 0.0:
             run_m = math.dist(top[:2], ground[:2])
             for speed_m_s in landing_speeds_m_s(self.vehicle, self.lands_m_s):
@@ -226,6 +229,7 @@ class _EndRules:
 def starts(problem: Problem, request: VehicleRequest, sharp: Floats) -> Iterator[FlightEnd]:
     """Climb-outs, on the requested heading or the most natural ones first. Raises NoMission if there is none."""
     slope = math.tan(math.radians(pitch_deg(request.vehicle))) * request.vehicle.tail_ratio
+    slope = math.inf if request.vehicle.vtol else slope
     given = request.takeoff_heading_deg
     heading = None if given is None else math.radians(90.0 - given)
     rules = _EndRules(problem, request.vehicle, over=over_m(request.vehicle))
@@ -238,6 +242,12 @@ def starts(problem: Problem, request: VehicleRequest, sharp: Floats) -> Iterator
         )
     straight = straight_ends(problem, required, sharp)
     first = next(straight, None)
+    if request.vehicle.vtol:
+        return _some(
+            chain([] if first is None else [first], straight),
+            f"{request.vehicle.name}: no vertical take-off, on any heading, clears the zones and the ceiling and leads "
+            "to where min AGL is met: give another start, or another takeoff_heading_deg",
+        )
     which = "on any heading" if given is None else f"on takeoff_heading_deg {given:g}"
     other = "start" if given is None else "heading"
     return _some(
@@ -262,6 +272,9 @@ def goals(problem: Problem, request: VehicleRequest, sharp: Floats) -> Iterator[
     rules = _EndRules(problem, request.vehicle, lands_m_s=request.vehicle.speed_max_m_s)
     rank = _landing_rank(problem, request)
     required = RequiredEnd(np.array(request.goal), slope, request.approach_agl_m, None, rules, rank)
+    if request.vehicle.vtol:
+        run_m = brakes_m(request.vehicle, problem.goal[2] + UPRIGHT_M)
+        required = replace(required, slope=math.inf, rank=lambda heading: 0.0, run_m=run_m)
     return _some(
         straight_ends(problem, required, sharp[::-1]),
         f"{request.vehicle.name}: no straight approach to the goal, on any heading, clears the ground and the "
@@ -270,6 +283,8 @@ def goals(problem: Problem, request: VehicleRequest, sharp: Floats) -> Iterator[
     )
 
 
+UPRIGHT_M = 200.0
+"""A VTOL brakes for a landing no more than this above the lowest legal height there, m, as far as is planned."""
 INTO_WIND = 0.15
 """The part of the way from the best to the worst wind for landing within which a heading is into the wind: 45° of a
 constant wind."""
@@ -390,7 +405,7 @@ def _circles_instead(
 
 def _why_so(problem: Problem, request: VehicleRequest, goal: FlightEnd | None) -> Iterator[Note]:
     """Why it lands on its heading: into the wind, uphill; nothing where neither decides."""
-    if goal is None:
+    if goal is None or not goal.slant:
         return
     behind, falls = _from_behind(request.vehicle, goal.heading), _falls(problem, request.goal, goal.heading)
     windy = max(request.vehicle.blows_m_s, default=0.0) - min(request.vehicle.blows_m_s, default=0.0) >= LEAST_WIND_M_S
@@ -403,6 +418,8 @@ def _notes(start: FlightEnd, goal: FlightEnd | None) -> Iterator[Note]:
     """How to launch it, and how it lands."""
     heading_deg = (90.0 - math.degrees(start.heading)) % 360.0
     far_m, up_m = math.dist(start.top[:2], start.ground[:2]), float(start.top[2] - start.ground[2])
+    if not start.slant:  # the check says how to stand it
+        return
     if start.circle is None:
         yield Note("climb_out", heading_deg=heading_deg, far_m=far_m, up_m=up_m)
     else:

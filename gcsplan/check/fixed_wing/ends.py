@@ -22,6 +22,11 @@ strip: there it keeps that half, over bare ground.
 speed, is at the altitude of its take-off long before the slant of its least pitch is, levels off there, and slows down
 to its cruise speed. The slant stays the climb-out's line, for with less power it is flown; its pieces get the speeds
 over ground at which their places are passed.
+
+A VTOL (quadplane.cpp; Q_ENABLE 1) flies a mission's way points on its wing; take-off and landing items alone are flown
+on its lift motors (`in_vtol_auto`). At the top of its take-off it speeds up where its nose points, and no item turns it
+there (`sets_off`). To its landing it flies on at the altitude that it has (`do_vtol_land`), and brakes over v²/2a
+(`stopping_distance`, Q_TRANS_DECEL): begun nearer to its place than that, it flies past, and back (`overshoot`).
 """
 
 from __future__ import annotations
@@ -34,16 +39,17 @@ from itertools import pairwise, takewhile
 import numpy as np
 
 from gcsplan.arrays import Floats
-from gcsplan.check.motion.circles import circle_reach_m
+from gcsplan.check.motion.circles import circle_growth, circle_reach_m
 from gcsplan.check.motion.flight_state import Aboard
 from gcsplan.check.motion.spline import towards
 from gcsplan.check.motion.stopping import about_turn_m
 from gcsplan.check.motion.stretch import SAME_PLACE_M, Place, Stretch, degree_m, flat_m, offset_m, on_globe, place_on
+from gcsplan.check.motion.turn_parameters import DEFAULTS
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import MissionItem
 from gcsplan.notes.note import Finding, Note
-from gcsplan.vehicle import OVER_TAKEOFF_M, ClimbOut, Vehicle
+from gcsplan.vehicle import BRAKES_M_S2, OVER_TAKEOFF_M, Autopilot, ClimbOut, Vehicle
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.geodesy.atmosphere import true_per_indicated
 from gcsplan.world.geometry.limits import Limits
@@ -80,8 +86,8 @@ too high, and the aircraft stands on it."""
 
 
 def is_wing(vehicle: Vehicle) -> bool:
-    """Return whether the vehicle cannot stand still in the air."""
-    return vehicle.turn_radius_m > 0.0
+    """Return whether the vehicle takes off and lands on its wing."""
+    return vehicle.turn_radius_m > 0.0 and not vehicle.vtol
 
 
 def climb_out(pilot: Aboard, seq: int, item: MissionItem, after: MissionItem | None) -> None:
@@ -526,3 +532,44 @@ def flared(top: Place, ground: Place, run_m: float, speed_m_s: float) -> list[Pl
     aim = at(1.0 - part, ground[2] + high_m)
     middle = at(0.5, top[2] - 0.5 * (fall - high_m) / (1.0 - part))
     return [aim, ground] if part == 0.5 else [middle, aim, ground]
+
+
+def brakes_m(vehicle: Vehicle, amsl_m: float, speed_m_s: float | None = None) -> float:
+    """How far a VTOL flies at an altitude, from an indicated airspeed (None: its fastest) to a standstill, m."""
+    indicated = vehicle.speed_max_m_s if speed_m_s is None else speed_m_s
+    return indicated**2 * circle_growth(amsl_m) / (2.0 * BRAKES_M_S2)
+
+
+def sets_off(pilot: Aboard, target: Place) -> Note | None:
+    """The heading on which a VTOL must stand, if its first leg leads to ``target``; None if this is no such leg."""
+    flown = pilot.flight.stretches
+    if not (flown and _is(pilot, flown[-1], cmd.VTOL_TAKEOFF)) or flat_m(pilot.at, target) <= SAME_PLACE_M:
+        return None
+    return Note("vtol_sets_off", heading_deg=math.degrees(math.atan2(*offset_m(pilot.at, target))) % 360.0)
+
+
+def overshoot(pilot: Aboard, seq: int, item: MissionItem) -> None:
+    """The places around a VTOL's landing that it reaches because the way there is too short to brake on."""
+    if pilot.autopilot is not Autopilot.ARDUPLANE:
+        return
+    last = pilot.flight.stretches[-1]
+    place = (*pilot.place(item), pilot.at[2])
+    brakes = brakes_m(pilot.vehicle, pilot.at[2], pilot.pace.speed_m_s)
+    past_m = brakes - max(flat_m(pilot.at, place) - _accepts_m(pilot, last) - last.reach_m, 0.0)
+    if past_m > 0.0 and not _is(pilot, last, cmd.VTOL_TAKEOFF):
+        pilot.instead(seq, "land", place, place, reach_m=past_m)
+        pilot.note(Note("vtol_overshoots", seq, brakes_m=brakes, past_m=past_m))
+
+
+def _is(pilot: Aboard, s: Stretch, command: int) -> bool:
+    """Whether ArduPlane flies a stretch for an item of a command."""
+    return pilot.autopilot is Autopilot.ARDUPLANE and pilot.items[s.seq - pilot.first_seq].command == command
+
+
+def _accepts_m(pilot: Aboard, s: Stretch) -> float:
+    """How far before the end of a stretch the next item may begin, m."""
+    if not _is(pilot, s, cmd.WAYPOINT):
+        return 0.0
+    own_m = pilot.items[s.seq - pilot.first_seq].params[1]
+    default_m = min(DEFAULTS.plane_radius_m, DEFAULTS.l1_ahead_m(pilot.pace.speed_m_s))
+    return own_m if own_m > 0.0 else default_m * circle_growth(pilot.at[2])

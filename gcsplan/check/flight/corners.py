@@ -8,8 +8,7 @@ A way point counts as reached within a radius. There the vehicle turns, and flie
 - ArduCopter (SCurve.cpp, `advance_target_along_track`): it begins the next leg while it still brakes on this one, where
   the middle of the turn lies within WPNAV_RADIUS (2 m), and not in the first half of either leg. The item's own radius
   is not stored. It stops at a hold, and before a landing, a return or a circle.
-- ArduPlane (commands_logic.cpp, `verify_nav_wp`): it uses param2 in whole metres, or `turn_distance` if that is 0.
-  Fixed wings, which turn with a radius, are in `arcs`; this module is for the VTOL.
+- ArduPlane turns with a radius, as a VTOL too: that is in `arcs`. Without a radius its corners are not judged.
 - After a circle the next leg begins anywhere on it.
 
 The only assumption about how a vehicle gets onto its next leg: it stays between that leg and the straight line from
@@ -32,7 +31,6 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from gcsplan.check.fixed_wing.arcs import bend
-from gcsplan.check.motion.circles import circle_growth
 from gcsplan.check.motion.stretch import SAME_PLACE_M, Flight, Stretch, flat_m, offset_m, place_on
 from gcsplan.check.motion.turn_parameters import DEFAULTS, Tuning
 from gcsplan.mavlink.mission import commands as cmd
@@ -58,11 +56,13 @@ def round_corners(flight: Flight, mission: Mission, vehicle: Vehicle, frame: Fra
     if vehicle.turn_radius_m > 0.0:
         bend(flight, mission, vehicle, frame, tuning)
         return
+    if mission.autopilot is Autopilot.ARDUPLANE:
+        flight.not_judged.append(Note("arcs_without_radius"))
+        return
     if math.isinf(vehicle.corner_accel_m_s2):
         return
     cutter = _Cutter(flight, mission, vehicle, tuning)
     flight.instead += cutter.widened(flight.stretches)
-    flight.not_judged += cutter.not_judged
     flight.notes += [note for note in cutter.notes if note not in flight.notes]
 
 
@@ -93,7 +93,6 @@ class _Cutter:
         for s in flight.instead:
             self.twins.setdefault(_way(s), []).append(s)
         self.notes: list[Note] = []
-        self.not_judged: list[Note] = []
 
     def widened(self, stretches: Sequence[Stretch]) -> list[Stretch]:
         """The stretches flown in place of ``stretches`` wherever corners are cut by more than the errors include."""
@@ -130,7 +129,7 @@ class _Cutter:
         turn, long_m = _turn(s, after), flat_m(s.start, s.end)
         sine = 1.0 if after.column else math.sin(min(turn, 0.5 * math.pi))
         rise_m = abs(s.end[2] - s.start[2])
-        radius_m = self._radius_m(s, after, turn, stops)
+        radius_m = self._radius_m(s, after, stops)
         if radius_m <= 0.0:
             return _Off()
         if self.copter:
@@ -146,11 +145,9 @@ class _Cutter:
         else:
             part = radius_m / long_m
             aside_m, sag_m = min(radius_m, radius_m * sine + part * off.aside_m), part * (rise_m + off.height_m)
-        if self.mission.autopilot is Autopilot.PX4:
-            sag_m = min(sag_m, self.tuning.px4_height_m)
-        return _Off(aside_m, sag_m)
+        return _Off(aside_m, min(sag_m, self.tuning.px4_height_m))
 
-    def _radius_m(self, s: Stretch, after: Stretch, turn: float, stops: bool) -> float:
+    def _radius_m(self, s: Stretch, after: Stretch, stops: bool) -> float:
         """How far before the end of ``s`` the vehicle may turn, m; 0 if it does not turn early."""
         item = self._item(s.seq)
         within = s.seq == after.seq and s.kind == after.kind == "cruise"  # pieces of one curve, or up to one circle
@@ -164,29 +161,11 @@ class _Cutter:
                 read = "WPNAV_RADIUS" in self.tuning.read
                 self._say(Note("corners_cut", radius_m=self.tuning.copter_radius_m, read=read))
             return self.tuning.copter_radius_m if fast else 0.0
-        if self.mission.autopilot is Autopilot.PX4:
-            accepts_m, own = self.tuning.px4_accepts_m(item)
-            if own:
-                return accepts_m
-            if self.tuning.px4_radius_m > self.limits.track_error_m:
-                read = "NAV_ACC_RAD" in self.tuning.read
-                self._say(Note("reached_within_default", s.seq, radius_m=self.tuning.px4_radius_m, read=read))
-            return self.tuning.px4_radius_m
-        return self._plane_radius_m(s, item, turn)
-
-    def _plane_radius_m(self, s: Stretch, item: MissionItem, turn: float) -> float:
-        if item.command != cmd.WAYPOINT:
-            return 0.0
-        if item.params[2] >= 1.0:
-            note = Note("turns_late", s.seq, past_m=float(item.params[2]))
-            if note not in self.not_judged:
-                self.not_judged.append(note)
-        if item.params[1] > 0.0:
-            return float(item.params[1])
-        read = "WP_RADIUS" in self.tuning.read
-        self._say(Note("turn_begun_by_default", s.seq, radius_m=self.tuning.plane_radius_m, read=read))
-        thin = circle_growth(max(s.start[2], s.end[2]))
-        return self.tuning.plane_turns_m(s.speed_m_s * math.sqrt(thin), turn, thin)
+        accepts_m, own = self.tuning.px4_accepts_m(item)
+        if not own and accepts_m > self.limits.track_error_m:
+            read = "NAV_ACC_RAD" in self.tuning.read
+            self._say(Note("reached_within_default", s.seq, radius_m=accepts_m, read=read))
+        return accepts_m
 
     # -- what is flown -------------------------------------------------------------------------------------------
 
@@ -195,11 +174,11 @@ class _Cutter:
         aside_m, height_m = self._beyond(begun, after)
         if aside_m <= 0.0 and height_m <= 0.0:
             return
-        radius_m, long_m = self._radius_m(s, after, turn := _turn(s, after), stops), flat_m(s.start, s.end)
+        radius_m, long_m = self._radius_m(s, after, stops), flat_m(s.start, s.end)
         if self.copter or radius_m >= long_m:
             yield from self._parts(s, (0.5 if self.copter else 0.0, 1.0), (aside_m, height_m), fading=False)
             return
-        aside_m *= math.cos(min(turn, 0.5 * math.pi))
+        aside_m *= math.cos(min(_turn(s, after), 0.5 * math.pi))
         yield from self._parts(s, (1.0 - radius_m / long_m, 1.0), (aside_m, height_m), fading=False)
 
     def _parts(

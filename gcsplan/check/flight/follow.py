@@ -28,7 +28,16 @@ from collections.abc import Callable, Hashable
 from dataclasses import replace
 from itertools import pairwise
 
-from gcsplan.check.fixed_wing.ends import REACHED_M, circle_up, climb_out, glide, is_wing, turns_early
+from gcsplan.check.fixed_wing.ends import (
+    REACHED_M,
+    circle_up,
+    climb_out,
+    glide,
+    is_wing,
+    overshoot,
+    sets_off,
+    turns_early,
+)
 from gcsplan.check.flight.arc_waypoint import fly_arc
 from gcsplan.check.flight.route import fly_all
 from gcsplan.check.flight.times import DAY_S
@@ -251,6 +260,7 @@ class _Pilot(Aboard):
     def _leg(self, seq: int, kind: StretchKind, target: Place, *, terrain: bool, hold_s: float = 0.0) -> None:
         """A leg from here to ``target``, with all the altitude profiles that the autopilot may fly on it."""
         here = self.at
+        self.note(sets_off(self, target))
         self.add(seq, kind, here, target, terrain=terrain, hold_s=hold_s, on_path=kind == "cruise")
         self.at = target
         self.direction = None if hold_s else towards(here, target)
@@ -346,6 +356,7 @@ class _Pilot(Aboard):
             self.landed = True
             return
         if self.has_place(item):
+            overshoot(self, seq, item)
             self._fly_to_landing(seq, item)
         ground = self.ground(self.at[0], self.at[1])
         if math.isnan(ground):
@@ -366,7 +377,7 @@ class _Pilot(Aboard):
         agl = here[2] - self.read(*here[:2])
         follows = (*level[:2], self.read(*level[:2]) + agl)
         self.at = follows if terrain and not math.isnan(follows[2]) else level
-        self.add(seq, "land", here, self.at, terrain=terrain)
+        self.add(seq, "land", here, self.at, terrain=terrain, on_path=self.vehicle.vtol)
         if terrain:
             self.settled(item)
         if self.autopilot is Autopilot.ARDUCOPTER and not terrain and not math.isnan(follows[2]):

@@ -13,7 +13,7 @@ from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
 from gcsplan.notes.note import Note
-from gcsplan.vehicle import Autopilot, Vehicle
+from gcsplan.vehicle import LIFTS_M_S, Autopilot, Vehicle
 from gcsplan.world.geodesy.atmosphere import true_per_indicated
 
 PLANE_GLIDE_SLOPE_MIN_M = 15.0  # ArduPlane GLIDE_SLOPE_MIN, default
@@ -98,7 +98,8 @@ class Aboard:
 
     def stretch(self, seq: int, kind: StretchKind, start: Place, end: Place, more: dict[str, object]) -> Stretch:
         """One stretch at the present pace."""
-        fields: dict[str, object] = {"rates_m_s": self.pace.rates_m_s, "jumped_from": self.jumped_from} | more
+        rates = LIFTS_M_S if self.vehicle.vtol and more.get("column") else self.pace.rates_m_s
+        fields: dict[str, object] = {"rates_m_s": rates, "jumped_from": self.jumped_from} | more
         made = Stretch(seq, kind, start, end, self.pace.speed_m_s, **fields)  # type: ignore[arg-type]
         return made if made.terrain or not self.off_m else replace(made, band_m=made.band_m + self.off_m)
 

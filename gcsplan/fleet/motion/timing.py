@@ -22,7 +22,7 @@ from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.fleet.motion.ardupilot import Curved, curved
 from gcsplan.fleet.motion.px4 import Smoothed, smoothed
 from gcsplan.fleet.motion.speeds import POSITION_ERROR_M, Segments, column, rounded
-from gcsplan.vehicle import Autopilot, MissionEnd, Vehicle
+from gcsplan.vehicle import LIFTS_M_S, Autopilot, MissionEnd, Vehicle
 from gcsplan.wind.drift import Drift, Drifts
 from gcsplan.world.geodesy.atmosphere import true_per_indicated
 
@@ -186,8 +186,8 @@ class Route:
     straight line home. ``follows``: its legs follow the ground. ``hold_items`` (N,): the caller's numbers of the
     holds; None: the numbers of the legs before them.
 
-    A fixed wing has no columns: ``climb_out`` (K, 3) leads from the ground to the first point, ``glide`` (K, 3) from
-    the last point down to the ground if it lands. After a return it circles over home and stays in the air.
+    A fixed wing has no columns (a VTOL has): ``climb_out`` (K, 3) leads from the ground to the first point, ``glide``
+    (K, 3) from the last point down to the ground if it lands. After a return it circles over home and stays in the air.
     ``climb_out_m_s`` (K - 1,) are true speeds along the climb-out, if they differ from every leg's speed.
     """
 
@@ -396,7 +396,7 @@ class _Motion:
 
 def _takeoff(route: Route, vehicle: Vehicle) -> Motion | None:
     ground, top = route.start_ground_amsl_m, route.points[0]
-    if route.climb_out is not None:
+    if route.climb_out is not None and not vehicle.vtol:
         owner, own = np.zeros(len(route.climb_out) - 1, dtype=np.intp), route.climb_out_m_s
         if own is not None:
             indicated = own / true_per_indicated(0.5 * (route.climb_out[1:, 2] + route.climb_out[:-1, 2]))
@@ -412,10 +412,10 @@ def _after(route: Route, vehicle: Vehicle) -> list[Motion]:
     """The stretches after the arrival."""
     goal, home = route.points[-1], route.points[0]
     number = len(route.points)
-    slanted = route.glide
+    slanted = None if vehicle.vtol else route.glide
     if route.climb_out is not None and route.end == "rtl":
         slanted = np.array([goal, [*route.climb_out[0, :2], _home(route)[1]]])
-    if slanted is not None or route.climb_out is not None:
+    if slanted is not None or (route.climb_out is not None and not (vehicle.vtol and route.end == "land")):
         if slanted is None:
             return []
         # A wing's return is judged level, in the middle of the band in which it may change its altitude.
@@ -459,6 +459,8 @@ def upright(
     """
     if from_amsl_m == to_amsl_m:
         return []
+    if vehicle.vtol:
+        vehicle = replace(vehicle, climb_m_s=LIFTS_M_S[0], descent_m_s=LIFTS_M_S[1])
     slow_m_s = min(vehicle.land_m_s, vehicle.descent_m_s)
     slow_from = to_amsl_m + LAND_SLOWLY_M
     if vehicle.autopilot is Autopilot.PX4:

@@ -7,6 +7,7 @@
   within its own radius when the leg begins would be passed over. ArduPlane stores it in one byte, so a corner that
   needs more becomes two way points on one arc.
 - No DO_LAND_START before a landing: with it ArduPlane does not arm unless RTL_AUTOLAND is set.
+- A VTOL takes off and lands vertically, and flies to its landing from the way point before the path's last one.
 """
 
 from __future__ import annotations
@@ -94,8 +95,9 @@ def build_wing(path: Path, world: World, vehicle: Vehicle, home_deg: tuple[float
     frame = m.RELATIVE if order.altitude_frame == "relative" else m.GLOBAL
     cm = _heights_cm(points, base, vehicle)
     # The first point turns from the climb-out into the path, the last one from the path into the glide.
-    whole = np.array([wing.leaves, *points, *([] if wing.touch is None else [wing.touch])])
-    tangent = tangents_m(whole, radius)[1 : len(points) + 1]
+    upright = vehicle.vtol
+    whole = np.array([wing.leaves, *points, *([] if wing.touch is None or upright else [wing.touch])])
+    tangent = tangents_m(whole, radius)[1:]
     run = np.hypot(*np.diff(whole[:, :2], axis=0).T)
     places = world.frame.to_degrees(points[:, 0], points[:, 1])
 
@@ -107,16 +109,15 @@ def build_wing(path: Path, world: World, vehicle: Vehicle, home_deg: tuple[float
 
     top = world.frame.to_degrees(wing.top[0], wing.top[1])
     speed = vehicle.speed_max_m_s if order.speed_m_s is None else order.speed_m_s
+    up, pitch = (cmd.VTOL_TAKEOFF, 0.0) if upright else (cmd.TAKEOFF, float(pitch_deg(vehicle)))
     items = [
-        item(
-            cmd.TAKEOFF, top, m.RELATIVE, round((wing.top[2] - datum) * 100), (float(pitch_deg(vehicle)), 0.0, 0.0, 0.0)
-        ),
+        item(up, top, m.RELATIVE, round((wing.top[2] - datum) * 100), (pitch, 0.0, 0.0, 0.0)),
         MissionItem(cmd.DO_CHANGE_SPEED, m.NO_POSITION, (0.0, speed, -1.0, 0.0)),
     ]
     if wing.up is not None:
         place, up_cm = world.frame.to_degrees(wing.up[0], wing.up[1]), round((wing.up[2] - datum) * 100)
         items.insert(1, item(cmd.LOITER_TO_ALT, place, m.RELATIVE, up_cm, (0.0, wing.up_m, 0.0, 0.0)))
-    for i in range(len(points)):
+    for i in range(len(points) - (upright and wing.touch is not None)):
         if i == len(points) - 1 and order.end == "loiter":
             items.append(item(cmd.LOITER_UNLIM, places[i], frame, int(cm[i]), (0.0, 0.0, wing.circle_m, 0.0)))
             continue
@@ -124,7 +125,8 @@ def build_wing(path: Path, world: World, vehicle: Vehicle, home_deg: tuple[float
         items.append(item(cmd.WAYPOINT, places[i], frame, int(cm[i]), (0.0, accepted, 0.0, 0.0)))
     if wing.touch is not None:
         touch = world.frame.to_degrees(wing.touch[0], wing.touch[1])
-        items.append(item(cmd.LAND, touch, m.RELATIVE, round((wing.touch[2] - datum) * 100), (0.0, 0.0, 0.0, 0.0)))
+        land = cmd.VTOL_LAND if upright else cmd.LAND
+        items.append(item(land, touch, m.RELATIVE, round((wing.touch[2] - datum) * 100), (0.0, 0.0, 0.0, 0.0)))
     elif order.end == "rtl":
         items.append(MissionItem(cmd.RTL, m.NO_POSITION))
     return Mission(vehicle.autopilot, home, tuple(items), vehicle.name, vehicle.sysid)

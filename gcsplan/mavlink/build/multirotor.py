@@ -6,9 +6,9 @@ that it does not matter which of the two an autopilot flies.
 
 A corner that is cut too near gets one way point more behind it, or is moved outwards. ArduCopter blends two legs within
 WPNAV_RADIUS, and not in the first half of either (`check.flight.corners`). A leg of some centimetres behind a corner,
-in the direction of the next leg, leaves the line as it is, and hardly room to cut it. PX4 and a VTOL turn an acceptance
-radius before a corner, whatever follows. So their corners are moved outwards by as much as they are cut there; the legs
-beside them move less and less towards their other ends, as what is cut does.
+in the direction of the next leg, leaves the line as it is, and hardly room to cut it. PX4 turns an acceptance radius
+before a corner, whatever follows. So its corners are moved outwards by as much as they are cut there; the legs beside
+them move less and less towards their other ends, as what is cut does.
 """
 
 from __future__ import annotations
@@ -111,20 +111,18 @@ def build_mission(path: Path, world: World, vehicle: Vehicle, home_deg: tuple[fl
         cm = _round_heights(points, rounded, base, vehicle, order)
     top_cm = round((path.points[0, 2] - datum) * 100)
     bearings = _bearings(points)
-    px4, plane = vehicle.autopilot is Autopilot.PX4, vehicle.autopilot is Autopilot.ARDUPLANE
+    px4 = vehicle.autopilot is Autopilot.PX4
 
     def item(command: int, i: int, frame: int, cm: int, *, radius_m: float = 0.0) -> MissionItem:
         yaw = round(float(bearings[max(i - 1, 0)]), 1) if px4 else 0.0
-        lands = command in (cmd.LAND, cmd.VTOL_LAND)
-        z = 0.0 if lands and not cm else altitude_of_cm(cm, vehicle.autopilot)
+        z = 0.0 if command == cmd.LAND and not cm else altitude_of_cm(cm, vehicle.autopilot)
         return MissionItem(command, frame, (0.0, radius_m, 0.0, yaw), int(lat_e7[i]), int(lon_e7[i]), z)
 
     radius = 0.0 if vehicle.autopilot is Autopilot.ARDUCOPTER else acceptance_radius_m(vehicle)
-    speed_kind = 0.0 if plane else 1.0
     speed = vehicle.speed_max_m_s if order.speed_m_s is None else order.speed_m_s
     items = [
-        item(cmd.VTOL_TAKEOFF if plane else cmd.TAKEOFF, 0, m.RELATIVE, top_cm),
-        MissionItem(cmd.DO_CHANGE_SPEED, m.NO_POSITION, (speed_kind, speed, -1.0, 0.0)),
+        item(cmd.TAKEOFF, 0, m.RELATIVE, top_cm),
+        MissionItem(cmd.DO_CHANGE_SPEED, m.NO_POSITION, (1.0, speed, -1.0, 0.0)),
     ]
     if order.hold_s > 0 or order.gate_utc is not None:  # right after take-off: a gate is exact from a standstill
         items.insert(1, _gate(order, vehicle))
@@ -140,7 +138,7 @@ def build_mission(path: Path, world: World, vehicle: Vehicle, home_deg: tuple[fl
         items.append(item(cmd.WAYPOINT, last, frame, int(cm[last]), radius_m=radius))
     if order.end == "land":
         pad_cm = _pad_cm(world, items[-1], datum, vehicle)
-        items.append(item(cmd.VTOL_LAND if plane else cmd.LAND, last, m.RELATIVE, pad_cm))
+        items.append(item(cmd.LAND, last, m.RELATIVE, pad_cm))
     elif order.end == "rtl":
         items.append(MissionItem(cmd.RTL, m.NO_POSITION))
     if order.return_path:

@@ -25,6 +25,7 @@ from gcsplan.mavlink.mission.commands import (
     LOITER_UNLIM,
     RTL,
     TAKEOFF,
+    VTOL_LAND,
     WAYPOINT,
 )
 from gcsplan.mavlink.mission.fences import FENCE_DECIDES, FENCE_MARGIN_M, SAFETY, acts, fences_in_force, is_fence
@@ -32,7 +33,7 @@ from gcsplan.mavlink.mission.mission import FRAME_SYNONYMS, TERRAIN, Mission
 from gcsplan.mavlink.mission.parameter_names import PARAMETERS, Name, OnBoard, Parameter, unanswered
 from gcsplan.mavlink.mission.return_parameters import AUTO_RTL
 from gcsplan.notes.note import Note
-from gcsplan.vehicle import COPTER_CORNER_ACCEL, COPTER_PEAK_ACCEL, GRAVITY_M_S2, Autopilot, Vehicle
+from gcsplan.vehicle import BRAKES_M_S2, COPTER_CORNER_ACCEL, COPTER_PEAK_ACCEL, GRAVITY_M_S2, Autopilot, Vehicle
 from gcsplan.world.geodesy.atmosphere import true_per_indicated
 
 __all__ = [
@@ -241,6 +242,14 @@ def _plane(
     if roll_deg > 0.0:
         why = Note("assumed_return_turns") if returns else Note("assumed_bank", speed_m_s=fastest)
         rows.append(Setting(known["roll"], roll_deg, "at least", why, "flight"))
+    rows.append(
+        Setting(
+            known["lifts"], float(vehicle.vtol), "equal", Note("assumed_lift", vtol=vehicle.vtol),
+            "flight" if vehicle.vtol else "report",
+        )
+    )  # fmt: skip
+    if any(item.command == VTOL_LAND for item in mission.items):
+        rows.append(Setting(known["brakes"], BRAKES_M_S2, "at least", Note("assumed_brakes"), "flight"))
     if vehicle.turn_radius_m > 0.0:
         rows.append(
             Setting(

@@ -191,6 +191,8 @@ PARAMETERS: dict[Autopilot, dict[str, Parameter]] = {
         _one("climb_most", "TECS_CLMB_MAX", 5.0, "m/s"),
         _one("descent_most", "TECS_SINK_MAX", 5.0, "m/s"),
         _one("pitch", "TECS_PITCH_MAX", 15.0, "°"),
+        _one("lifts", "Q_ENABLE", 0.0),
+        _one("brakes", "Q_TRANS_DECEL", 2.0, "m/s²"),
     ),
     Autopilot.PX4: _table(
         _one("speed_most", "MPC_XY_VEL_MAX", 12.0, "m/s"),

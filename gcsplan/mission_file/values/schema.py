@@ -324,7 +324,10 @@ class VehicleKeys(LimitKeys):
     leg_jerk_m_s3: Accel = 1.0
     """Jerk of ArduPilot's S-curves (WPNAV_JERK). On PX4, if absent, 4 (`MPC_JERK_AUTO`)."""
     turn_radius_m: Length = 0.0
-    """Above 0: a fixed wing, whose corners are planned and judged as arcs."""
+    """An arduplane's corners are planned and judged as arcs of it. Above 0: a fixed wing; if absent, a VTOL's at 30°
+    of bank."""
+    vtol: bool | None = None
+    """Whether an arduplane takes off and lands vertically; if absent, where no `turn_radius_m` is given."""
     climb_out_m_s: Speed | None = None
     """Climb rate of a fixed wing's take-off, mean from leaving the ground to its altitude; if absent, not counted."""
     climb_out_speed_m_s: Speed | None = None

@@ -46,8 +46,8 @@ SHARPEST_RAD = math.radians(60.0)
 STEP_DEG = 15.0
 """Step between the headings that are tried if none is requested."""
 
-LONGER_M, LONGEST_M = 20.0, 6000.0
-"""Climb-outs are lengthened in steps of the first, up to the second."""
+LONGER_M, LONGEST_M, HIGHEST_M = 20.0, 6000.0, 1500.0
+"""Climb-outs are lengthened in steps of the first, up to the second; upright ones in the same parts of the third."""
 
 SAMPLE_M = 10.0
 
@@ -81,7 +81,8 @@ class EndJudge(Protocol):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class RequiredEnd:
-    """The required end: at ``ground`` (3,), with a slant as steep as ``slope``, to at least ``agl_m`` above it.
+    """The required end: at ``ground`` (3,), with a slant as steep as ``slope``, to at least ``agl_m`` above it; upright
+    if that is inf. ``run_m``: the least length of the level way behind it.
 
     ``heading``: the only one, radians from east to north, seen outwards; None for any. ``rank``: a heading of a lower
     rank is tried before others; of the same rank, the one nearer to the direction of the path.
@@ -93,6 +94,7 @@ class RequiredEnd:
     heading: float | None
     judge: EndJudge
     rank: Callable[[float], float] = field(default=lambda heading: 0.0)
+    run_m: float = 0.0
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -115,6 +117,11 @@ class FlightEnd:
         """Start of the first level leg: the end of the slant, or the top of the circles over their middle."""
         return self.top if self.circle is None else self.circle
 
+    @property
+    def slant(self) -> list[Floats]:
+        """Its ground alone, seen from its top; nothing if that is upright."""
+        return [] if math.dist(self.ground[:2], self.top[:2]) == 0.0 else [self.ground]
+
 
 def around_m(problem: Problem) -> float:
     """Radius of a circle for waiting or climbing: whole metres, at least the turn radius."""
@@ -124,7 +131,7 @@ def around_m(problem: Problem) -> float:
 def straight_ends(problem: Problem, required: RequiredEnd, sharp: Floats) -> Iterator[FlightEnd]:
     """The legal ends, seen outwards from the ground; ``sharp`` (N, 3) is the path from there, without arcs."""
     ground, radius = required.ground, problem.turn_radius_m
-    run_m = radius * math.tan(0.5 * SHARPEST_RAD) + 20.0
+    run_m = radius * math.tan(0.5 * SHARPEST_RAD) + max(required.run_m, 20.0)
     aim = _along(sharp, (float(sharp[0, 2]) - float(ground[2])) / required.slope + run_m + 2.0 * radius)
     for heading in _headings(ground, aim, required):
         end = _end(problem, required, heading, aim, run_m)
@@ -149,22 +156,23 @@ def _end(problem: Problem, required: RequiredEnd, heading: float, aim: Floats, r
     way = np.array([math.cos(heading), math.sin(heading)])
     least = ground[2] + max(required.agl_m or 0.0, limits.min_agl_m)
     slanted = _steep(limits)
-    length = (least - ground[2]) / slope
-    while length <= LONGEST_M:
-        z = math.floor((ground[2] + slope * length - ground[2]) * 100.0) / 100.0 + ground[2]
-        top = np.array([*(ground[:2] + length * way), z])
+    rise = least - ground[2]
+    step = slope if math.isfinite(slope) else HIGHEST_M / LONGEST_M
+    while rise <= step * LONGEST_M:
+        z = math.floor(rise * 100.0) / 100.0 + ground[2]
+        top = np.array([*(ground[:2] + rise / slope * way), z])
         chain = _chain(top, heading, aim, run_m, problem.turn_radius_m)
         needed = _floor(air, np.vstack([top, chain]), limits)
         if math.isinf(needed):
             return None
         if needed > z:
-            length += max((needed - z) / slope, 1.0) if needed - z < 50.0 else LONGER_M
+            rise += max(needed - z, step) if needed - z < 50.0 else LONGER_M * step
             continue
         if not required.judge.slant_clear(ground, top):
             return None
         if air.clear(Legs.of_path(np.vstack([top, chain]), slanted), slanted).all():
             return FlightEnd(ground, top, chain, heading)
-        length += LONGER_M
+        rise += LONGER_M * step
     return None
 
 
@@ -298,7 +306,7 @@ def _slowed(points: Floats, leaves: Floats, problem: Problem) -> Floats:
 
 def unfitting_legs(points: Floats, start: FlightEnd, goal: FlightEnd | None, radius_m: float) -> Indices:
     """The legs between whose corners, joints included, the arcs do not fit; leg 0 leaves the climb-out."""
-    whole = np.array([start.leaves, *points, *([] if goal is None else [goal.ground])])
+    whole = np.array([start.leaves, *points, *([] if goal is None else goal.slant)])
     tangent = tangents_m(whole, radius_m)
     run = np.hypot(*np.diff(whole[:, :2], axis=0).T)
     return np.flatnonzero(tangent[:-1] + tangent[1:] > run + LACKING_M)
@@ -307,7 +315,7 @@ def unfitting_legs(points: Floats, start: FlightEnd, goal: FlightEnd | None, rad
 def cut_off_m(points: Floats, start: FlightEnd, goal: FlightEnd | None, radius_m: float) -> float:
     """Metres by which the flown path may be shorter than from the end of the climb-out to the approach: the arcs cut
     off both joints, and circles do not pass their middle. ``points`` (N, 3) begin behind the first joint."""
-    whole = np.vstack([start.ground, start.leaves, points, *([] if goal is None else [goal.ground])])
+    whole = np.vstack([*start.slant, start.leaves, points, *([] if goal is None else goal.slant)])
     tangent = tangents_m(whole, radius_m)
     cut_m = 2.0 * (tangent - radius_m * np.arctan(tangent / radius_m))
     return float(cut_m[1] + cut_m[-2]) + abs(start.circle_m)

@@ -98,6 +98,7 @@ PARAMETER_TABLES: dict[Autopilot, dict[str, StoredParameter]] = {
         "FS_GCS_ENABL": _i(0, INT8),
         "FS_LONG_ACTN": _i(0, INT8),
         "Q_ENABLE": _i(0, INT8),
+        "Q_TRANS_DECEL": _r(2.0),
         "ROLL_LIMIT_DEG": _r(45.0),
         "RTL_ALTITUDE": _r(100.0),
         "RTL_AUTOLAND": _i(0, INT8),

@@ -141,10 +141,11 @@ def test_a_wind_too_strong_is_refused_with_one_that_was_tried() -> None:
 
 
 def test_a_vtol_keeps_an_airspeed_and_its_flight_in_winds_is_not_judged() -> None:
-    verdict = flown(blows((5, 5), (90, 90)), vehicle(Autopilot.ARDUPLANE))
+    vtol = replace(vehicle(Autopilot.ARDUPLANE), vtol=True)
+    verdict = flown(blows((5, 5), (90, 90)), vtol)
     assert (verdict.safe, verdict.arrive_window_s()) == (None, None)
     assert "vtol_in_wind" in {note.code for note in verdict.not_judged}
-    assert flown(blows((0, 0), (0, 0)), vehicle(Autopilot.ARDUPLANE)).safe is True
+    assert flown(blows((0, 0), (0, 0)), vtol).safe is True
 
 
 def test_a_wing_arrives_when_the_pilots_handbook_says() -> None:

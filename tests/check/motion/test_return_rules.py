@@ -89,7 +89,7 @@ def test_a_copter_ends_on_the_ground_and_a_plane_on_a_circle() -> None:
 
 
 def test_a_turn_about_takes_twice_the_larger_of_track_error_and_radius_at_least() -> None:
-    v = vehicle(PLANE, track_error_m=7.0)
+    v = replace(vehicle(PLANE, track_error_m=7.0), turn_radius_m=0.0)
     assert about_turn_m(v, 0.1, 0.0) == 14.0
     assert about_turn_m(replace(v, turn_radius_m=50.0), 0.1, 0.0) == 100.0
     assert at_home_m(v.limits) == 7.0

@@ -19,7 +19,7 @@ from gcsplan.world.geodesy.frame import Frame
 from gcsplan.world.geometry.limits import Limits
 from gcsplan.world.geometry.surface import Surface
 from gcsplan.world.world import World
-from tests.campaigns.limit_cases import WING_RADIUS_M, WING_SPEED_M_S, make_ground, make_mission
+from tests.campaigns.limit_cases import WING_RADIUS_M, WING_SPEED_M_S, WINGED, make_ground, make_mission
 
 FAMILIES = {
     "px4": Autopilot.PX4, "vtol": Autopilot.ARDUPLANE, "terrain": Autopilot.ARDUCOPTER, "wing": Autopilot.ARDUPLANE,
@@ -45,15 +45,15 @@ def test_longitudes_are_taken_from_the_nearer_side() -> None:
 def flown_at(family: str, lon_deg: float) -> tuple[Mission, Vehicle, World]:
     """The same mission in metres around a place on the 40th parallel south."""
     rng = np.random.default_rng(7)
-    ground = make_ground(rng, 5000.0 if family == "wing" else 900.0)
+    ground = make_ground(rng, 5000.0 if family in WINGED else 900.0)
     level = np.zeros_like(ground.heights)
     surface, pilot = Surface(level, level, ground.grid), FAMILIES[family]
-    frame = Frame(-40.0, lon_deg - (0.006 if family == "wing" else 0.0))  # in the middle of what is flown
+    frame = Frame(-40.0, lon_deg - (0.006 if family in WINGED else 0.0))  # in the middle of what is flown
     mission = make_mission(rng, family, pilot, ground, surface, frame)
-    radius_m, speed_m_s = (WING_RADIUS_M, WING_SPEED_M_S) if family == "wing" else (0.0, 10.0)
+    radius_m, speed_m_s = (WING_RADIUS_M, WING_SPEED_M_S) if family in WINGED else (0.0, 10.0)
     craft = Vehicle(
         "uav1", 1, pilot, Limits(10.0, horizontal_clearance_m=2.0, track_error_m=1.0), speed_max_m_s=speed_m_s,
-        turn_radius_m=radius_m, energy=Energy(120.0, 100.0, hover_w=300.0, battery_j=1e7),
+        turn_radius_m=radius_m, vtol=family == "vtol", energy=Energy(120.0, 100.0, hover_w=300.0, battery_j=1e7),
     )  # fmt: skip
     return mission, craft, World(frame, Airspace(surface, ()))
 

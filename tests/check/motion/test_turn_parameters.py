@@ -28,10 +28,10 @@ def test_px4_takes_its_own_parameter_where_the_item_gives_no_radius() -> None:
 
 def test_arduplane_turns_by_its_own_parameters_where_the_item_gives_no_radius() -> None:
     craft = vehicle(PLANE, horizontal_clearance_m=0.0)  # at 15 m/s it turns 61 m before a right angle
-    near = inside(970.0, 30.0, 20.0)
+    near = inside(970.0, 42.0, 10.0)
     assert verdict(around(PLANE, 0.0), near, craft).safe is False
-    assert verdict(around(PLANE, 5.0), near, craft).safe is True
-    assert verdict(around(PLANE, 0.0), near, craft, Tuning.of({"WP_RADIUS": 5.0})).safe is True
+    assert verdict(around(PLANE, 40.0), near, craft).safe is True
+    assert verdict(around(PLANE, 0.0), near, craft, Tuning.of({"WP_RADIUS": 40.0})).safe is True
 
 
 def test_arducopter_cuts_within_its_own_radius_and_stops_at_a_hold() -> None:

@@ -35,13 +35,6 @@ def test_each_end_has_its_items(end: str, last: list[int]) -> None:
     assert commands(mission) == [cmd.TAKEOFF, cmd.DO_CHANGE_SPEED, cmd.WAYPOINT, cmd.WAYPOINT, *last]
 
 
-def test_arduplane_takes_off_and_lands_as_a_vtol_and_sends_an_acceptance_radius() -> None:
-    mission = build_mission(PATH, WORLD, vehicle(Autopilot.ARDUPLANE, track_error_m=40.7), HOME_DEG, Order())
-    assert commands(mission)[0] == cmd.VTOL_TAKEOFF
-    assert commands(mission)[-1] == cmd.VTOL_LAND
-    assert mission.items[2].params[1] == 40.0
-
-
 @pytest.mark.parametrize("slope", [0.05, 0.0, -0.05])
 def test_a_copters_landing_says_where_the_ground_is(slope: float) -> None:
     """ArduCopter 4.7 slows down at 10 m above this altitude: with 0 it hits ground above home at full descent rate."""
