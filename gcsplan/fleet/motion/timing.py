@@ -166,7 +166,8 @@ def _in_air(points: Floats, vehicle: Vehicle, pace: Floats | None, rates_m_s: Fl
     """``pace`` and ``rates_m_s`` with the part of the true airspeed that is horizontal on each part, in still air."""
     d = np.diff(points, axis=0)
     length = np.linalg.norm(d, axis=1)
-    level = np.hypot(d[:, 0], d[:, 1]) / np.where(length > 0.0, length, 1.0)
+    run = np.hypot(d[:, 0], d[:, 1])
+    level = np.where(run > 0.0, run / np.where(length > 0.0, length, 1.0), 1.0)  # straight up its rates alone bound it
     faster = true_per_indicated(0.5 * (points[1:, 2] + points[:-1, 2]))
     rates = np.array([[vehicle.climb_m_s, vehicle.descent_m_s]]) if rates_m_s is None else rates_m_s
     return faster * level * (1.0 if pace is None else pace), faster[:, None] * rates
