@@ -69,7 +69,7 @@ def _climb_out_and_glide(v: VehiclePlan, world: World) -> tuple[Floats | None, F
         return None, None
     legs = v.verdict.legs
     first = next(i for i, leg in enumerate(legs) if leg.on_path)
-    down = [leg for leg in legs[first:] if leg.kind == "land" and not leg.on_path]
+    down = [leg for leg in legs[first:] if leg.kind == "land"]
     return _line(legs[:first], world), _line(down, world) if down else None
 
 

@@ -377,7 +377,8 @@ class _Pilot(Aboard):
         agl = here[2] - self.read(*here[:2])
         follows = (*level[:2], self.read(*level[:2]) + agl)
         self.at = follows if terrain and not math.isnan(follows[2]) else level
-        self.add(seq, "land", here, self.at, terrain=terrain, on_path=self.vehicle.vtol)
+        vtol = self.vehicle.vtol
+        self.add(seq, "cruise" if vtol else "land", here, self.at, terrain=terrain, on_path=vtol)
         if terrain:
             self.settled(item)
         if self.autopilot is Autopilot.ARDUCOPTER and not terrain and not math.isnan(follows[2]):

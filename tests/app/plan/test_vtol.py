@@ -14,6 +14,9 @@ from gcsplan.app.plan.model import VehiclePlan
 from gcsplan.errors import InputError
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mission_file import load_mission
+from gcsplan.sim.flight.kinematics import Kinematics
+from gcsplan.sim.flight.mission_flight import fly
+from gcsplan.sim.flight.track import make_track
 from tests.support.noted import codes
 
 WHOLE = {
@@ -52,6 +55,17 @@ def test_a_vtol_has_columns_and_turns_as_wide_as_it_banks() -> None:
     assert max(turns) < math.radians(10.0)  # chords of arcs, no corners
     assert v.gap_percent is not None
     assert 0.0 <= v.gap_percent < 3.0
+
+
+@pytest.mark.slow
+def test_a_rehearsal_arrives_when_the_plan_says() -> None:
+    for end in ("land", "loiter"):
+        v = planned(no_fly=[disc(2000, 200, 400)], end=end)
+        assert v.brief is not None
+        craft = v.request.vehicle
+        track = make_track(v.mission, craft, v.brief.world, Kinematics.of(craft))
+        assert v.verdict.arrive_s is not None
+        assert fly([track], [0.0]).arrive_s[0] == pytest.approx(v.verdict.arrive_s, abs=4.0)
 
 
 @pytest.mark.parametrize("end", ["loiter", "rtl"])
