@@ -132,6 +132,10 @@ INPUT_TEXTS = {
     "autopilot_taken": (
         "a .waypoints file does not name its autopilot: it is taken to be for {autopilot} (--autopilot)"
     ),
+    "taken_for_no_vtol": (
+        "the file has items of a VTOL (command {command}), which flies on its wing between them, and does not say for "
+        "which vehicle it is: say it (--autopilot arduplane; arducopter, if it is a multicopter's)"
+    ),
     "file_not_read": "not read, and not on this page: {why}",
     "plan_without_autopilot": "the file does not say for which autopilot it is: it was read for {autopilot}",
     "plan_rally_points_unread": "the file's {keys} was not read; {cure}",

@@ -24,6 +24,7 @@ from gcsplan.mavlink.mission.mission import (
     float32,
 )
 from gcsplan.notes.note import Note
+from gcsplan.vehicle import Autopilot
 
 MAX_FILE_BYTES = 20_000_000
 """Largest mission file that is read, in bytes."""
@@ -86,6 +87,13 @@ class MissionFileRead:
     def not_judged(self) -> tuple[Note, ...]:
         """What a check of the mission leaves out because of its file."""
         return tuple(note for note in (self.unread_fence, self.other_kind) if note is not None)
+
+
+def vtol_taken(mission: Mission) -> Note | None:
+    """Why a mission that was only taken for a multicopter's is not judged as one: it has a VTOL's items."""
+    copter = mission.autopilot is not Autopilot.ARDUPLANE
+    vtol = [i.command for i in mission.items if i.command in (cmd.VTOL_TAKEOFF, cmd.VTOL_LAND, cmd.DO_VTOL_TRANSITION)]
+    return Note("taken_for_no_vtol", autopilot=mission.autopilot.value, command=vtol[0]) if copter and vtol else None
 
 
 def in_degrees(command: int, frame: int) -> bool:

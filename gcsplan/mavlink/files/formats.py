@@ -10,7 +10,7 @@ from os import PathLike
 from pathlib import Path
 
 from gcsplan.errors import InputError
-from gcsplan.mavlink.files.file_items import MAX_FILE_BYTES, MissionFileRead
+from gcsplan.mavlink.files.file_items import MAX_FILE_BYTES, MissionFileRead, vtol_taken
 from gcsplan.mavlink.files.plan_file import parse_plan, read_plan, write_plan
 from gcsplan.mavlink.files.waypoints_file import parse_waypoints, read_waypoints, write_waypoints
 from gcsplan.mavlink.mission.mission import Home
@@ -56,6 +56,7 @@ def read_mission_file(
         read = parse_waypoints(text, autopilot=taken, where=where, home_hint=home_hint)
         if autopilot is None:
             read = replace(read, notes=(*read.notes, Note("autopilot_taken", autopilot=taken.value)))
+            read = replace(read, other_kind=vtol_taken(read.mission))
     else:
         raise InputError(
             f"neither a .waypoints file (first line 'QGC WPL 110') nor a .plan file (a JSON object){_instead(file)}",

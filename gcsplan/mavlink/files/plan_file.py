@@ -30,6 +30,7 @@ from gcsplan.mavlink.files.file_items import (
     jumps_from_file,
     jumps_to_file,
     read_item,
+    vtol_taken,
     whole,
 )
 from gcsplan.mavlink.files.plan_fence import (
@@ -204,7 +205,10 @@ def parse_plan(text: str, *, autopilot: Autopilot | None, where: str, home_hint:
     if others and not theirs:
         notes.append(Note("plan_keys_unread", keys=tuple(k[:40] for k in others[:8])))
     unread = Note("plan_fence_unread", keys=unread_fence, cure=RESAVE) if unread_fence else None
-    return MissionFileRead(Mission(pilot, home, items), tuple(notes), fence, rally, unread, _other_kind(mission, pilot))
+    found_in, other = Mission(pilot, home, items), _other_kind(mission, pilot)
+    if autopilot is None and mission.get("vehicleType") in (None, 0):
+        other = vtol_taken(found_in)
+    return MissionFileRead(found_in, tuple(notes), fence, rally, unread, other)
 
 
 def _json(text: str, where: str) -> Any:

@@ -753,3 +753,18 @@ def test_a_pipe_does_not_hold_the_reader(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.plan")
     with pytest.raises(InputError, match="not a regular file"):
         read_mission_file(tmp_path / "pipe.plan", autopilot=COPTER)
+
+
+def test_a_vtols_file_that_names_no_vehicle_is_not_judged_as_a_copters(tmp_path: Path) -> None:
+    rows = ["QGC WPL 110", "0 1 0 16 0 0 0 0 36.6 -84.3 400 1", "1 0 3 84 0 0 0 0 36.6 -84.3 60 1"]
+    file = tmp_path / "a.waypoints"
+    file.write_text("\n".join(row.replace(" ", "\t") if k else row for k, row in enumerate(rows)) + "\n")
+    taken = read_mission_file(file, autopilot=None, otherwise=Autopilot.ARDUCOPTER)
+    assert [n.code for n in taken.not_judged] == ["taken_for_no_vtol"]
+    for said in (Autopilot.ARDUCOPTER, Autopilot.ARDUPLANE):
+        assert read_mission_file(file, autopilot=said).not_judged == ()
+    plan = json.loads(write_plan(read_mission_file(file, autopilot=Autopilot.ARDUPLANE).mission))
+    for kind, codes in ((0, ["taken_for_no_vtol"]), (1, []), (2, []), (20, [])):
+        plan["mission"]["vehicleType"] = kind
+        file.write_text(json.dumps(plan))
+        assert [n.code for n in read_mission_file(file, autopilot=None).not_judged] == codes
