@@ -112,7 +112,7 @@ def bend(flight: Flight, mission: Mission, vehicle: Vehicle, frame: Frame, tunin
             banded = [i for i in other if _same_way(i, s)]
             for i in banded:
                 other.remove(i)
-            new += legs.banded(k, banded[0]) if banded else legs.instead(k)
+            new += [piece for band in banded for piece in legs.banded(k, band)] if banded else legs.instead(k)
     flight.stretches[:] = climbed(bent, vehicle)
     flight.instead[:] = other + new
     error_m = vehicle.limits.track_error_m
@@ -303,16 +303,18 @@ class _Run:
         return lat, lon, float(z)
 
     def banded(self, k: int, band: Stretch) -> Iterator[Stretch]:
-        """Leg ``k`` at any altitude between those of its ends, as one level band."""
-        z0, z1 = self.points[k, 2], self.points[k + 1, 2]
+        """Leg ``k`` at the altitudes of a level ``band``, as that one."""
+        level = band.start[2]
         if band.terrain:
             yield band
             return
-        track = [(p, 0.5 * (z0 + z1), off) for p, _, off in self._track(k)]
-        for piece in self._pieces(k, track):
-            level = 0.5 * (z0 + z1)
+        for piece in self._pieces(k, [(p, level, off) for p, _, off in self._track(k)]):
             yield replace(
-                piece, start=(*piece.start[:2], level), end=(*piece.end[:2], level), band_m=0.5 * abs(z1 - z0)
+                piece,
+                start=(*piece.start[:2], level),
+                end=(*piece.end[:2], level),
+                band_m=band.band_m,
+                reach_m=piece.reach_m + band.reach_m,
             )
 
     def instead(self, k: int) -> Iterator[Stretch]:

@@ -26,7 +26,7 @@ over ground at which their places are passed.
 A VTOL (quadplane.cpp; Q_ENABLE 1) flies a mission's way points on its wing; take-off and landing items alone are flown
 on its lift motors (`in_vtol_auto`). At the top of its take-off it speeds up where its nose points, and no item turns it
 there (`sets_off`). To its landing it flies on at the altitude that it has (`do_vtol_land`), and brakes over v²/2a
-(`stopping_distance`, Q_TRANS_DECEL): begun nearer to its place than that, it flies past, and back (`overshoot`).
+(`stopping_distance`, Q_TRANS_DECEL): begun nearer to its place than that, it flies past, and back (`level_approach`).
 """
 
 from __future__ import annotations
@@ -475,6 +475,7 @@ def glide(pilot: Aboard, seq: int, item: MissionItem) -> None:
     pilot.note(Note("glide_straight", seq))
     pilot.note(_downhill(pilot, seq, end))
     pilot.add(seq, "land", pilot.at, end, column=True)
+    pilot.begins_low(seq, "land", pilot.at, end, column=True)
     for speed_m_s in landing_speeds_m_s(pilot.vehicle, pilot.pace.speed_m_s):
         for a, b in pairwise(flared(pilot.at, end, flat_m(pilot.at, end), speed_m_s)):
             pilot.instead(seq, "land", a, b, column=True)
@@ -548,16 +549,25 @@ def sets_off(pilot: Aboard, target: Place) -> Note | None:
     return Note("vtol_sets_off", heading_deg=math.degrees(math.atan2(*offset_m(pilot.at, target))) % 360.0)
 
 
-def overshoot(pilot: Aboard, seq: int, item: MissionItem) -> None:
-    """The places around a VTOL's landing that it reaches because the way there is too short to brake on."""
+def level_approach(pilot: Aboard, seq: int, item: MissionItem) -> None:
+    """All the altitudes at which a VTOL may fly to its landing, and the places around it that it reaches because the
+    way there is too short to brake on."""
     if pilot.autopilot is not Autopilot.ARDUPLANE:
         return
-    last = pilot.flight.stretches[-1]
-    place = (*pilot.place(item), pilot.at[2])
-    brakes = brakes_m(pilot.vehicle, pilot.at[2], pilot.pace.speed_m_s)
-    past_m = brakes - max(flat_m(pilot.at, place) - _accepts_m(pilot, last) - last.reach_m, 0.0)
+    last, here = pilot.flight.stretches[-1], pilot.at
+    place, accepts_m = (*pilot.place(item), here[2]), _accepts_m(pilot, last)
+    pilot.begins_low(seq, "cruise", here, place, part=1.0)
+    # It keeps the altitude that it has where the item begins, on the slope of the leg before.
+    long_m = flat_m(last.start, last.end)
+    off_m = (last.end[2] - last.start[2]) * min(accepts_m / long_m, 1.0) if long_m > SAME_PLACE_M else 0.0
+    level_m = here[2] - 0.5 * off_m
+    start, end = (*here[:2], level_m), (*place[:2], level_m)
+    if off_m and not last.column:
+        pilot.instead(seq, "cruise", start, end, band_m=0.5 * abs(off_m))
+    brakes = brakes_m(pilot.vehicle, here[2], pilot.pace.speed_m_s)
+    past_m = brakes - max(flat_m(here, place) - accepts_m - last.reach_m, 0.0)
     if past_m > 0.0 and not _is(pilot, last, cmd.VTOL_TAKEOFF):
-        pilot.instead(seq, "land", place, place, reach_m=past_m)
+        pilot.instead(seq, "cruise", end, end, reach_m=past_m, band_m=0.5 * abs(off_m))
         pilot.note(Note("vtol_overshoots", seq, brakes_m=brakes, past_m=past_m))
 
 

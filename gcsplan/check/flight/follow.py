@@ -34,7 +34,7 @@ from gcsplan.check.fixed_wing.ends import (
     climb_out,
     glide,
     is_wing,
-    overshoot,
+    level_approach,
     sets_off,
     turns_early,
 )
@@ -266,10 +266,8 @@ class _Pilot(Aboard):
         self.direction = None if hold_s else towards(here, target)
         if self.autopilot is not Autopilot.ARDUPLANE:
             return
-        if self.low_m and not terrain:  # it corrects that within half the leg
-            half = tuple(0.5 * (a + b) for a, b in zip(here, target, strict=True))
-            low, on = (*here[:2], here[2] - self.low_m), (half[0], half[1], half[2] - self.low_m)
-            self.instead(seq, kind, low, on, reach_m=self.around_m)
+        if not terrain:
+            self.begins_low(seq, kind, here, target)
         self.low_m = 0.0
         self.at_once(seq, kind, here, target, terrain=terrain)
 
@@ -339,7 +337,8 @@ class _Pilot(Aboard):
                 self._lose(seq, item)
                 return
             self.add(seq, "loiter", around, around, band_m=0.5 * (high - low), reach_m=reach_m)
-            self.low_m, self.around_m = min(REACHED_M, self.at[2] - low), reach_m
+            rise = self.at[2] - before[2]
+            self.low_m, self.around_m = math.copysign(min(REACHED_M, abs(rise)), rise), reach_m
         elif self.autopilot is Autopilot.PX4 and before[2] != self.at[2]:  # level first, then up or down there
             self.instead(seq, "cruise", before, (*place, before[2]))
             self.instead(seq, "loiter", (*place, before[2]), self.at, column=True)
@@ -356,7 +355,7 @@ class _Pilot(Aboard):
             self.landed = True
             return
         if self.has_place(item):
-            overshoot(self, seq, item)
+            level_approach(self, seq, item)
             self._fly_to_landing(seq, item)
         ground = self.ground(self.at[0], self.at[1])
         if math.isnan(ground):

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from gcsplan.check.motion.commands import Pace
 from gcsplan.check.motion.spline import Direction
-from gcsplan.check.motion.stretch import Flight, Place, Stretch, StretchKind, near_lon
+from gcsplan.check.motion.stretch import Flight, Place, Stretch, StretchKind, near_lon, place_on
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
@@ -70,7 +70,7 @@ class Aboard:
         self.airborne = False
         self.known = True
         self.landed = self.stopped = False
-        self.low_m, self.around_m = 0.0, 0.0  # how far below `at`, and to the side, the next leg may begin, m
+        self.low_m, self.around_m = 0.0, 0.0  # how far below `at` (negative: above) and aside the next leg may begin, m
 
     def note(self, note: Note | None) -> None:
         """Add a note unless it is there, if there is one: a round may be flown more than once."""
@@ -95,6 +95,16 @@ class Aboard:
             middle = 0.5 * rise
             low, high = (*here[:2], here[2] + middle), (*target[:2], target[2] - middle)
             self.instead(seq, kind, low, high, terrain=terrain, reach_m=reach_m, band_m=abs(middle))
+
+    def begins_low(
+        self, seq: int, kind: StretchKind, here: Place, target: Place, *, column: bool = False, part: float = 0.5
+    ) -> None:
+        """The beginning of a leg that an ArduPlane may begin lower or higher, behind a circle: it corrects that within
+        a ``part`` of it."""
+        if self.low_m:
+            on = place_on(here, target, part)
+            low, end = (*here[:2], here[2] - self.low_m), (*on[:2], on[2] - self.low_m)
+            self.instead(seq, kind, low, end, reach_m=self.around_m, column=column)
 
     def stretch(self, seq: int, kind: StretchKind, start: Place, end: Place, more: dict[str, object]) -> Stretch:
         """One stretch at the present pace."""

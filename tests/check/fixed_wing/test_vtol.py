@@ -11,6 +11,9 @@ from gcsplan.check.fixed_wing.ends import brakes_m
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
+from gcsplan.world.airspace import Airspace
+from gcsplan.world.geometry.zones import Circle, Level, Zone
+from gcsplan.world.world import World
 from tests.check.flight.test_corners import FLAT, HOME, PLANE, around, at, inside, verdict
 from tests.support.noted import coded
 from tests.support.worlds import vehicle
@@ -80,3 +83,29 @@ def test_a_take_off_or_landing_on_the_wing_is_not_judged() -> None:
         found = verdict(replace(one, items=changed), FLAT, CRAFT)
         assert found.safe is None
         coded(found.not_judged, code)
+
+
+def low(up_m: float, north_m: float) -> World:
+    """A zone of 40 m up to ``up_m`` above the ground of home, on the way to the landing of `landing`."""
+    return World(
+        FLAT.frame, Airspace(FLAT.airspace.surface, [Zone("low", Circle(0.0, north_m, 40.0), None, Level(up_m, "agl"))])
+    )
+
+
+def test_the_way_to_a_landing_is_as_low_as_it_is_where_the_item_begins() -> None:
+    # A climb of 10 % ends at 200 m, and the landing begins 60 m before: at 194 m, less 5 m of error.
+    up, _, land = landing(400.0).items
+    climbs = at(cmd.WAYPOINT, 0, 1000, 200, 0, 60.0)
+    flown = Mission(PLANE, HOME, (up, climbs, land), "uav1")
+    assert verdict(flown, low(190.0, 1250.0), CRAFT).safe is False
+    assert verdict(flown, low(188.0, 1250.0), CRAFT).safe is True
+
+
+@pytest.mark.parametrize(("command", "under_m"), [(cmd.VTOL_LAND, (92.0, 86.0)), (cmd.LAND, (63.0, 51.0))])
+def test_a_landing_behind_a_circle_begins_lower(command: int, under_m: tuple[float, float]) -> None:
+    # LOITER_TO_ALT counts its altitude as reached within 5 m; a glide corrects that within its first half.
+    circle, down = at(cmd.LOITER_TO_ALT, 0, 1000, 100, 0, 80.0), at(command, 0, 3000, 0)
+    flown = Mission(PLANE, HOME, (at(cmd.VTOL_TAKEOFF, 0, 0, 75), circle, down), "uav1")
+    craft = replace(CRAFT, vtol=command == cmd.VTOL_LAND)
+    kinds = [{f.kind for f in verdict(flown, low(up_m, 1500.0), craft).findings} for up_m in under_m]
+    assert ["zone" in found for found in kinds] == [True, False]
