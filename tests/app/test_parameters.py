@@ -223,6 +223,31 @@ def test_a_wing_that_cannot_fly_its_turns_or_its_speed_is_refused(parameters: di
     assert words in refused.message
 
 
+@pytest.mark.parametrize(
+    ("parameters", "words"),
+    [
+        ({}, "Q_ENABLE is 0 on board, and 1 is assumed"),
+        ({"Q_ENABLE": 2.0}, "Q_ENABLE is 2 on board, and 1 is assumed"),
+        ({"Q_ENABLE": 1.0, "Q_TRANS_DECEL": 1.0}, "Q_TRANS_DECEL is 1 on board, and at least 2 is assumed"),
+    ],
+)
+def test_a_vtols_mission_goes_to_no_plane_that_flies_it_otherwise(parameters: dict[str, float], words: str) -> None:
+    done = planned(keys(**(WING | {"turn_radius_m": 0, "end": "land"})))
+    assert sent(done, board("arduplane", **CRUISE, Q_ENABLE=1.0)).verified
+    refused = sent(done, board("arduplane", **CRUISE, **parameters), allow_parameters=True)
+    assert (refused.outcome, refused.reason) == ("refused", "parameters")
+    assert words in refused.message
+
+
+def test_a_wings_mission_goes_to_no_plane_with_lift_motors(tmp_path: Any) -> None:
+    """It would take off and land on them (quadplane.cpp, `is_vtol_takeoff`); a small board does not know Q_ENABLE."""
+    done = planned(keys(**WING))
+    refused = sent(done, board("arduplane", **CRUISE, Q_ENABLE=1.0), allow_parameters=True)
+    assert (refused.outcome, refused.reason) == ("refused", "parameters")
+    assert "Q_ENABLE is 1 on board, and 0 is assumed" in refused.message
+    assert sent(done, board("arduplane", Misbehaviour(mute="Q_ENABLE"), **CRUISE), timeout_s=0.6).verified
+
+
 @pytest.mark.first_quick
 @pytest.mark.parametrize(
     "parameters", [{"RTL_ALT_TYPE": 1}, {"WPNAV_ACCEL": 50}, {"RTL_CLIMB_MIN": 5000}, {"RTL_CONE_SLOPE": 1.0}]

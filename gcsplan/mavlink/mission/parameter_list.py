@@ -72,7 +72,7 @@ class Setting:
     time, which no other value can be counted for), where the vehicle ``turns`` (judged again with
     `turn_parameters.Tuning`, but for the return from anywhere), the ``return`` or the ``flight`` itself (the proof does
     not hold), or nothing but a ``report``. ``also``: other values that are within the rule, like a 0 that switches it
-    off.
+    off. ``may_lack``: some boards do not have it, and fly as assumed.
     """
 
     parameter: Parameter
@@ -81,11 +81,12 @@ class Setting:
     why: Note
     matters: Matters
     also: tuple[float, ...] = ()
+    may_lack: bool = False
 
     @property
     def needed(self) -> bool:
         """Whether the proof hangs on it, so that silence is no answer."""
-        return self.matters != "report"
+        return self.matters != "report" and not self.may_lack
 
     def allows(self, amount: float) -> bool:
         """Whether an amount on board is within the rule."""
@@ -242,12 +243,8 @@ def _plane(
     if roll_deg > 0.0:
         why = Note("assumed_return_turns") if returns else Note("assumed_bank", speed_m_s=fastest)
         rows.append(Setting(known["roll"], roll_deg, "at least", why, "flight"))
-    rows.append(
-        Setting(
-            known["lifts"], float(vehicle.vtol), "equal", Note("assumed_lift", vtol=vehicle.vtol),
-            "flight" if vehicle.vtol else "report",
-        )
-    )  # fmt: skip
+    lift = Note("assumed_lift", vtol=vehicle.vtol)
+    rows.append(Setting(known["lifts"], float(vehicle.vtol), "equal", lift, "flight", may_lack=not vehicle.vtol))
     if any(item.command == VTOL_LAND for item in mission.items):
         rows.append(Setting(known["brakes"], BRAKES_M_S2, "at least", Note("assumed_brakes"), "flight"))
     if vehicle.turn_radius_m > 0.0:
