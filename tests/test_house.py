@@ -357,8 +357,8 @@ def test_a_function_fits_on_a_screen() -> None:
 MOST_IN_A_FOLDER = 15
 
 MOST = {
-    "modules": 503,
-    "statements": 74_025,
+    "modules": 504,
+    "statements": 74_160,
     "type names with two meanings": 0,
     "constants with two values": 0,
     "folders with more than 15 modules": 0,

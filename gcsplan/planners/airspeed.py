@@ -22,6 +22,16 @@ _NO_WAY_M = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
+class Shortest:
+    """No path is shorter than ``length_m``, nor than ``stretched_m`` in the plane that is stretched along the wind for
+    the true airspeed ``true_m_s`` (`WindPlane`); 0: not known."""
+
+    length_m: float
+    stretched_m: float = 0.0
+    true_m_s: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
 class Airspeed:
     """The airspeed that a fixed wing keeps along its path, as it indicates it, and its largest rates of climb and
     descent at sea level, m/s. In thinner air all three are faster by the same factor. ``wind_m_s``: the one wind that
@@ -36,6 +46,10 @@ class Airspeed:
     def blows_m_s(self) -> float:
         """The speed of the wind."""
         return math.hypot(*self.wind_m_s)
+
+    def true_m_s(self, amsl_m: float) -> float:
+        """The true airspeed at an altitude."""
+        return self.indicated_m_s * float(true_per_indicated(amsl_m))
 
     def leg_s(
         self, run_m: Floats | float, rise_m: Floats | float, amsl_m: Floats | float, way_m: Floats | None = None
@@ -63,6 +77,13 @@ class Airspeed:
         room = np.square(true_m_s) - self.blows_m_s**2 + np.square(tail_m_s)
         return np.asarray(np.divide(long_m, tail_m_s + np.sqrt(room)))
 
+    def _stretched_s(self, least: Shortest, with_wind: float, true_m_s: Floats) -> Floats:
+        """(...) as `_over_ground_s`, by the least length of stretched ways as well."""
+        room, of_plane = np.square(true_m_s) - self.blows_m_s**2, least.true_m_s**2 - self.blows_m_s**2
+        faster = (room - of_plane) * least.length_m**2 + of_plane * least.stretched_m**2
+        slower = room * least.stretched_m**2 + (1.0 - room / of_plane) * with_wind**2
+        return np.asarray((np.sqrt(np.where(room >= of_plane, faster, slower)) - with_wind) / room)
+
     def path_s(self, points: Floats, run_m: Floats | None = None) -> float:
         """Seconds of the path through ``points`` (N, 3); ``run_m`` (N - 1,): its track, if that is longer."""
         d, middle_m = np.diff(points, axis=0), 0.5 * (points[1:, 2] + points[:-1, 2])
@@ -82,10 +103,10 @@ class Airspeed:
         )
 
     def least_s(
-        self, length_m: float, ends_amsl_m: tuple[float, float], limits: Limits, top_amsl_m: float, off_m: float = 0.0,
+        self, least: Shortest, ends_amsl_m: tuple[float, float], limits: Limits, top_amsl_m: float, off_m: float = 0.0,
         way_m: tuple[float, float] = (0.0, 0.0), aside_m: float = 0.0,
     ) -> float:  # fmt: skip
-        """No path takes less that is at least ``length_m`` long, begins and ends within ``off_m`` of two altitudes,
+        """No path takes less that is no shorter than ``least``, begins and ends within ``off_m`` of two altitudes,
         leads ``way_m`` to east and to north within ``aside_m``, keeps the slopes of ``limits`` and rises to
         ``top_amsl_m`` at most.
 
@@ -111,5 +132,7 @@ class Airspeed:
             passed_s += until_s
             lost_s += until_s - until_m / (fastest_m_s + wind_m_s)
         with_wind = float(np.dot(way_m, self.wind_m_s)) + aside_m * wind_m_s
-        over_s = self._over_ground_s(length_m, with_wind, fastest_m_s) + np.maximum(lost_s, 0.0)
-        return float(np.maximum(over_s, passed_s).min() * (1.0 - _SPARE))
+        over_s = self._over_ground_s(least.length_m, with_wind, fastest_m_s)
+        if least.stretched_m > 0.0:
+            over_s = np.maximum(over_s, self._stretched_s(least, with_wind, fastest_m_s))
+        return float(np.maximum(over_s + np.maximum(lost_s, 0.0), passed_s).min() * (1.0 - _SPARE))

@@ -179,9 +179,9 @@ class Airspace:
     """A surface and its zones, with the functions that judge legs.
 
     ``scale`` >= 1: largest scale of the plane over the mission; real metres times it are at most metres of the plane,
-    so every horizontal clearance is multiplied by it. ``zones`` are those given, with higher ceilings above ground
-    where the ground has two heights (`over_both_grounds`), and ``zone_table`` is what the planners read of them.
-    ``field``, ``surfaces`` and ``grounds`` are the surface as the kernels read it.
+    so every horizontal clearance is multiplied by it. ``zones`` are those that were ``given``, with higher ceilings
+    above ground where the ground has two heights (`over_both_grounds`), and ``zone_table`` is what the planners read of
+    them. ``field``, ``surfaces`` and ``grounds`` are the surface as the kernels read it.
     """
 
     def __init__(self, surface: Surface, zones: Sequence[Zone] = (), *, scale: float = 1.0) -> None:
@@ -189,7 +189,7 @@ class Airspace:
             raise ValueError(f"scale must be 1 or a little more, given {scale:g}")
         self.surface = surface
         self.scale = scale
-        self._given = tuple(zones)
+        self.given = tuple(zones)
         self.field = Field.of(surface.grid)
         self.zone_table = ZoneTable.of(over_both_grounds(zones, surface, self.field, scale), surface, self.field, scale)
         self.zones = self.zone_table.zones
@@ -202,7 +202,7 @@ class Airspace:
         self._held_zones = Held(ZONES, *self.zone_table.arrays)
 
     def __reduce__(self) -> tuple[Callable[..., Airspace], tuple[Surface, tuple[Zone, ...], float]]:
-        return _remade, (self.surface, self._given, self.scale)
+        return _remade, (self.surface, self.given, self.scale)
 
     def __repr__(self) -> str:
         return f"<Airspace: {self.surface!r}, {len(self.zones)} zones>"

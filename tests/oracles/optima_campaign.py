@@ -171,7 +171,7 @@ def at_airspeed(seed: int) -> dict[str, Any]:
     rng = np.random.default_rng([seed, 53])
     fast = float(rng.choice([8.0, 15.0, 30.0]))
     rates = rng.choice([math.inf, 0.3, 0.1], 2, p=[0.6, 0.2, 0.2]) * fast
-    blows_m_s, angle = fast * float(rng.choice([0.0, 0.3, 0.6])), float(rng.uniform(0.0, 2.0 * math.pi))
+    blows_m_s, angle = fast * float(rng.choice([0.0, 0.3, 0.6, 0.9])), float(rng.uniform(0.0, 2.0 * math.pi))
     wind_m_s = blows_m_s * math.cos(angle), blows_m_s * math.sin(angle)
     airspeed = Airspeed(fast, float(rates[0]), float(rates[1]), wind_m_s)
     return {"objective": "time", "airspeed": airspeed, "speed_m_s": 2.6 * fast}

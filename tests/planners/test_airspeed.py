@@ -11,7 +11,7 @@ import pytest
 
 from gcsplan.arrays import Floats
 from gcsplan.fleet.motion.timing import legs
-from gcsplan.planners.airspeed import Airspeed
+from gcsplan.planners.airspeed import Airspeed, Shortest
 from gcsplan.planners.optimal.planner import plan
 from gcsplan.planners.problem import Problem
 from gcsplan.world.airspace import Airspace
@@ -54,22 +54,22 @@ def test_no_profile_found_by_brute_force_is_faster_and_the_best_is_near(seed: in
     degrees = [math.degrees(math.atan(n * step_m / run_m)) for n in (up, down)]
     limits = Limits(0.0, max_climb_deg=degrees[0], max_descent_deg=degrees[1])
     straight_m = math.hypot(length_m, ends_m[1] - ends_m[0])
-    bound_s = Airspeed(FAST_M_S).least_s(straight_m, ends_m, limits, top_m)
+    bound_s = Airspeed(FAST_M_S).least_s(Shortest(straight_m), ends_m, limits, top_m)
     if math.isfinite(best_s):
         assert 0.98 * best_s < bound_s <= best_s
 
 
 def test_ends_that_are_a_little_higher_take_no_less_than_the_bound() -> None:
     limits, fast = Limits(0.0, max_climb_deg=5.0, max_descent_deg=5.0), Airspeed(FAST_M_S)
-    near = fast.least_s(3000.0, (100.0, 200.0), limits, 400.0, 0.01)
+    near = fast.least_s(Shortest(3000.0), (100.0, 200.0), limits, 400.0, 0.01)
     for off in ((0.01, 0.01), (-0.01, 0.01), (0.01, -0.01)):
-        there = fast.least_s(3000.0, (100.0 + off[0], 200.0 + off[1]), limits, 400.0)
+        there = fast.least_s(Shortest(3000.0), (100.0 + off[0], 200.0 + off[1]), limits, 400.0)
         assert near <= there <= near * 1.0001
 
 
 def test_a_rate_that_is_slower_than_the_slope_takes_its_time() -> None:
     limits = Limits(0.0, max_climb_deg=20.0)
-    bound_s = Airspeed(FAST_M_S, climb_m_s=1.0).least_s(2000.0, (0.0, 500.0), limits, 600.0)
+    bound_s = Airspeed(FAST_M_S, climb_m_s=1.0).least_s(Shortest(2000.0), (0.0, 500.0), limits, 600.0)
     assert 500.0 / thinner(500.0) <= bound_s <= 500.0
 
 
@@ -111,18 +111,27 @@ def test_no_random_path_in_a_wind_is_faster_than_the_bound(rates_m_s: tuple[floa
         steep = {"max_climb_deg": max(slopes.max(), 0.1), "max_descent_deg": max(-slopes.min(), 0.1)}
         ends_m, way_m = (points[0, 2], points[-1, 2]), (d[:, 0].sum(), d[:, 1].sum())
         length_m, top_m = float(np.linalg.norm(d, axis=1).sum()), float(points[:, 2].max())
-        bound_s = fast.least_s(length_m, ends_m, Limits(0.0, **steep), top_m, 0.0, way_m)
         took_s = flown_s(points, fast.wind_m_s, rates_m_s)
+        limits, at_m = Limits(0.0, **steep), float(rng.uniform(0.0, 900.0))
+        bound_s = fast.least_s(Shortest(length_m), ends_m, limits, top_m, 0.0, way_m)
+        # In the stretched plane, at the airspeed of any altitude, by the definition of its metric.
+        true_m_s = FAST_M_S * float(thinner(at_m))
+        along = d[:, :2] @ np.array(fast.wind_m_s)
+        stretched_m = float(np.sqrt((d * d).sum(axis=1) + along**2 / (true_m_s**2 - blows**2)).sum())
+        least = Shortest(length_m, stretched_m, true_m_s)
+        closer_s = fast.least_s(least, ends_m, limits, top_m, 0.0, way_m)
+        assert bound_s <= closer_s <= took_s
         assert fast.path_s(points) == pytest.approx(took_s, rel=1e-4)
-        assert bound_s <= took_s
-        near.append(took_s / bound_s)
+        near.append(took_s / closer_s)
     assert min(near) < 1.02
 
 
 def test_a_level_way_in_a_wind_is_bounded_by_its_own_time() -> None:
     for wind_m_s in ((0.0, 0.0), (12.0, 5.0), (-15.0, 2.0)):
         fast, points = Airspeed(FAST_M_S, wind_m_s=wind_m_s), np.array([[0.0, 0.0, 50.0], [3000.0, -4000.0, 50.0]])
-        bound_s = fast.least_s(5000.0, (50.0, 50.0), Limits(0.0, max_climb_deg=8.0), 50.0, 0.0, (3000.0, -4000.0))
+        bound_s = fast.least_s(
+            Shortest(5000.0), (50.0, 50.0), Limits(0.0, max_climb_deg=8.0), 50.0, 0.0, (3000.0, -4000.0)
+        )
         assert bound_s == pytest.approx(fast.path_s(points), rel=1e-6)
         assert bound_s == pytest.approx(flown_s(points, wind_m_s, (math.inf, math.inf)), rel=1e-6)
 

@@ -31,14 +31,15 @@ import numpy as np
 from gcsplan.arrays import Bools, Floats
 from gcsplan.errors import NoMission
 from gcsplan.notes.note import Note
-from gcsplan.planners.airspeed import Airspeed
+from gcsplan.planners.airspeed import Airspeed, Shortest
 from gcsplan.planners.border import exit_cost
 from gcsplan.planners.optimal.loop.governor import govern
 from gcsplan.planners.optimal.loop.workspace import Workspace
 from gcsplan.planners.optimal.plane.incumbent import Incumbent
 from gcsplan.planners.optimal.table import all_searches, kinds, left_out
+from gcsplan.planners.optimal.wind_plane import WindPlane
 from gcsplan.planners.optimal.window import plan_over
-from gcsplan.planners.problem import Problem, Progress, Refusal, Solution, ceiling_m, terminals_of
+from gcsplan.planners.problem import PlanFunction, Problem, Progress, Refusal, Solution, ceiling_m, terminals_of
 from gcsplan.planners.profile.climb_laps import on_the_spot
 from gcsplan.planners.refusal.explain import check_ends, explain
 from gcsplan.world.geometry.limits import Limits
@@ -56,56 +57,122 @@ def plan(problem: Problem) -> Solution:
     names the binding constraint and whether it is proved that there is no path.
     """
     if problem.objective == "time" and problem.airspeed is not None:
-        return _at_airspeed(problem, problem.airspeed)
+        return _WingTime(problem, problem.airspeed).solution()
+    return _over_all(problem, _within)
+
+
+def _over_all(problem: Problem, plan_surface: PlanFunction) -> Solution:
+    """`plan` by a function that plans over one surface."""
     problem = replace(problem, budget=problem.budget.anew(problem.budget_s, problem.budget_mb))
-    found = plan_over(problem, _within)
+    found = plan_over(problem, plan_surface)
     # The searches bound paths between the exact ends; the mission's ends may lie beside them.
     bound = None if found.lower_bound is None else problem.rounding().bound(found.lower_bound)
     return replace(found, lower_bound=bound)
 
 
-def _at_airspeed(problem: Problem, airspeed: Airspeed) -> Solution:
-    """`plan` for the least time of a fixed wing: the shortest path, which `turns` flies as high as is worth it; or the
-    shortest one that is flown at full speed, if its rates of climb and descent bind."""
-    shorter = replace(problem, objective="length", progress=None)
+class _WingTime:
+    """The least time of a fixed wing: the fastest path that is found, and a time that no path beats.
 
-    def in_seconds(now: Progress) -> None:
-        assert problem.progress is not None
-        cost = None if now.path is None else airspeed.path_s(now.path.points)
-        bound = None if now.lower_bound is None else _least_s(shorter, airspeed, now.lower_bound)
-        problem.progress(replace(now, cost=cost, lower_bound=bound))
+    The shortest path is flown as high as is worth it (`turns`). While it is apart from its bound, two more are planned
+    with half the budget: in a wind, the shortest in the stretched plane, for its bound; and, if rates of climb and
+    descent bind, the shortest that is flown at full speed.
+    """
 
-    found = plan(replace(shorter, progress=None if problem.progress is None else in_seconds))
-    bound = None
-    if found.lower_bound is not None:
-        bound = _least_s(replace(found.problem or shorter, objective="length"), airspeed, found.lower_bound)
-    cost = airspeed.path_s((found.flown or found.path).points)
-    gentle = airspeed.at_full_speed(shorter.limits)
-    if gentle != shorter.limits:
-        with contextlib.suppress(NoMission):
-            half_s = 0.5 * shorter.budget_s
-            other = plan(replace(shorter, limits=gentle, checked=None, widen=None, budget_s=half_s))
-            other_s = airspeed.path_s((other.flown or other.path).points)
-            found, cost = (other, other_s) if other_s < cost else (found, cost)
-    far = bound is None or cost > bound * (1.0 + problem.gap_percent / 100.0)
-    return replace(
-        found,
-        lower_bound=bound,
-        problem=None if found.problem is None else replace(found.problem, objective="time", progress=problem.progress),
-        stopped_by="exhausted" if far and found.stopped_by == "gap" else found.stopped_by,
-    )
+    def __init__(self, problem: Problem, airspeed: Airspeed) -> None:
+        self.problem, self.airspeed = problem, airspeed
+        self.best: Solution | None = None
+        self.cost_s, self.bound_s, self.length_m = math.inf, 0.0, 0.0
+
+    @property
+    def near(self) -> bool:
+        """Whether path and bound are as near to each other as requested."""
+        return self.cost_s <= self.bound_s * (1.0 + self.problem.gap_percent / 100.0)
+
+    def solution(self) -> Solution:
+        """The solution. Raises Refusal."""
+        shorter = replace(self.problem, objective="length", progress=None)
+        half = replace(shorter, budget_s=0.5 * shorter.budget_s)
+        found, over = self._straight(shorter)
+        if self.airspeed.blows_m_s > 0.0 and not self.near:
+            self._stretch(replace(over, budget_s=half.budget_s), (found.flown or found.path).points)
+        gentle = self.airspeed.at_full_speed(shorter.limits)
+        if gentle != shorter.limits and not self.near:
+            with contextlib.suppress(NoMission):
+                self._take(plan(replace(half, limits=gentle, checked=None, widen=None)))
+        assert self.best is not None
+        now, stopped = self.best.problem, self.best.stopped_by
+        return replace(
+            self.best,
+            lower_bound=self.bound_s or None,
+            problem=None if now is None else replace(now, objective="time", progress=self.problem.progress),
+            stopped_by="gap" if self.near else "exhausted" if stopped == "gap" else stopped,
+        )
+
+    def _straight(self, problem: Problem) -> tuple[Solution, Problem]:
+        """Plan the shortest path in the true plane; return it, and the problem over the terrain that this took."""
+
+        def in_seconds(now: Progress) -> None:
+            cost = None if now.path is None else self.airspeed.path_s(now.path.points)
+            self._tell(now, cost, problem, Shortest(now.lower_bound or 0.0))
+
+        found = plan(replace(problem, progress=None if self.problem.progress is None else in_seconds))
+        over = replace(found.problem or problem, objective="length", progress=None)
+        if found.lower_bound is not None:
+            self.length_m = found.lower_bound
+            leaving = Shortest(max(found.lower_bound, _leaving(over)))
+            self.bound_s = self._least_s(over, Shortest(found.lower_bound), leaving)
+        self._take(found)
+        return found, over
+
+    def _stretch(self, over: Problem, flown: Floats) -> None:
+        """Raise the bound by that of the shortest path in the stretched plane. No path is searched there: the one
+        ``flown`` (N, 3), stretched, is short enough, and the check of a skew grid may refuse it."""
+        plane = WindPlane.of(self.airspeed, max(over.start[2], over.goal[2]))
+        there = plane.problem(over)
+        rounding, leaving = there.rounding(), exit_cost(there)
+
+        def least(bound: float) -> Shortest:
+            return Shortest(self.length_m, rounding.bound(bound), plane.true_m_s)
+
+        def in_seconds(now: Progress) -> None:
+            self._tell(replace(now, path=None), self.cost_s, over, least(min(now.lower_bound or 0.0, leaving)))
+
+        paths = tuple(kind.NAME for kind in kinds() if kind.IMPROVES == "paths")
+        there = replace(
+            there,
+            options={**there.options, "without": (*left_out(there), *paths)},
+            budget=there.budget.anew(there.budget_s, there.budget_mb),
+            progress=None if self.problem.progress is None else in_seconds,
+        )
+        found = search(there, over.turn_radius_m <= 0.0, plane.stretched(flown)).incumbent.bound
+        bound_s = self._least_s(over, least(min(found, leaving)), least(leaving))
+        self.bound_s = max(self.bound_s, bound_s)
+
+    def _take(self, found: Solution) -> None:
+        cost_s = self.airspeed.path_s((found.flown or found.path).points)
+        if cost_s < self.cost_s:
+            self.best, self.cost_s = found, cost_s
+
+    def _tell(self, now: Progress, cost: float | None, over: Problem, least: Shortest) -> None:
+        if self.problem.progress is not None:
+            bound = max(self._least_s(over, least, least), self.bound_s)
+            self.problem.progress(replace(now, cost=cost, lower_bound=bound))
+
+    def _least_s(self, over: Problem, least: Shortest, leaving: Shortest) -> float:
+        """No path takes less if none is shorter than ``least``, and none that leaves the terrain than ``leaving``;
+        ``over``: the problem for lengths."""
+        limits, ends, off_m = over.bound_limits, (over.start[2], over.goal[2]), over.rounding_m[1]
+        way_m = over.goal[0] - over.start[0], over.goal[1] - over.start[1]
+        rest = off_m, way_m, 2.0 * over.rounding_m[0]
+        within_s = self.airspeed.least_s(least, ends, limits, ceiling_m(over, limits), *rest)
+        # Beyond the terrain that is loaded the ground may be higher, but that is far.
+        beyond = ceiling_m(over, replace(limits, max_agl_m=None))
+        return min(within_s, self.airspeed.least_s(leaving, ends, limits, beyond, *rest))
 
 
-def _least_s(over: Problem, airspeed: Airspeed, length_m: float) -> float:
-    """No path of a fixed wing takes less if none is shorter than ``length_m``; ``over``: the problem for lengths."""
-    limits, ends, off_m = over.bound_limits, (over.start[2], over.goal[2]), over.rounding_m[1]
-    way_m = over.goal[0] - over.start[0], over.goal[1] - over.start[1]
-    rest = off_m, way_m, 2.0 * over.rounding_m[0]
-    within_s = airspeed.least_s(length_m, ends, limits, ceiling_m(over, limits), *rest)
-    # Beyond the terrain that is loaded the ground may be higher, but that is far.
-    beyond = ceiling_m(over, replace(limits, max_agl_m=None))
-    far_m = max(length_m, over.rounding().bound(exit_cost(over)))
-    return min(within_s, airspeed.least_s(far_m, ends, limits, beyond, *rest))
+def _leaving(problem: Problem) -> float:
+    """Metres that a path has at least which leaves the terrain."""
+    return problem.rounding().bound(exit_cost(problem))
 
 
 def _within(problem: Problem) -> Solution:
@@ -115,9 +182,12 @@ def _within(problem: Problem) -> Solution:
     return _sharp(problem)
 
 
-def search(problem: Problem, sharp: bool = True) -> Workspace:
-    """Run all searches on a problem; the result, with best path and bound, is in the ``incumbent`` of what returns."""
+def search(problem: Problem, sharp: bool = True, known: Floats | None = None) -> Workspace:
+    """Run all searches on a problem; the result, with best path and bound, is in the ``incumbent`` of what returns.
+    ``known`` (N, 3): a path that is legal, to begin with."""
     incumbent = Incumbent(_under_one_ceiling(problem), sharp)
+    if known is not None:
+        incumbent.take(known)
     incumbent.tell("search")
     work = Workspace(incumbent)
     govern(incumbent, all_searches(work))

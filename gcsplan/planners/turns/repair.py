@@ -157,8 +157,8 @@ def _shortened(problem: Problem, here: Tried, k: int, patience: Patience) -> Tri
 
 def cost_of(problem: Problem, risen: Risen) -> float:
     """The cost of a flight, measured along the arcs, not their chords."""
-    climbs = np.diff(risen.flown[:, 2])
-    return float(problem.slope_costs(np.diff(risen.true_m), climbs).sum())
+    d, middle_m = np.diff(risen.flown, axis=0), 0.5 * (risen.flown[1:, 2] + risen.flown[:-1, 2])
+    return float(problem.slope_costs(np.diff(risen.true_m), d[:, 2], middle_m, d[:, :2]).sum())
 
 
 def tried(problem: Problem, arc_path: ArcPath, like: Tried | None = None) -> Tried:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -63,6 +63,22 @@ class GridMap:
         coefficients[POWERS.index((1, 0)), 0] = 1.0 / dx_m
         coefficients[POWERS.index((0, 1)), 1] = -1.0 / dy_m
         return cls(coefficients, (west_m, north_m), 1.0, 0.0)
+
+    def mapped(self, back: Floats) -> GridMap:
+        """The map from another plane, whose places (..., 2) times ``back`` (2, 2) are those of this one."""
+        forth = np.linalg.inv(back)
+        east_m, north_m = (np.array(self.centre) @ forth).tolist()
+        half_m = self.scale_m * float(np.abs(forth).sum(axis=0).max())  # the box holds all of the fitted square
+
+        def exact(east_m: Floats, north_m: Floats) -> tuple[Floats, Floats]:
+            col, row = self(*(np.column_stack([east_m, north_m]) @ back).T).T
+            return col, row
+
+        fitted = GridMap.fit(exact, (east_m - half_m, north_m - half_m, east_m + half_m, north_m + half_m))
+        degrees = _IN_U + _IN_V
+        most = degrees[self.coefficients.any(axis=1)].max(initial=0)  # a linear map keeps the degree
+        error_m = fitted.error_m + self.error_m * float(np.linalg.norm(forth, 2))
+        return replace(fitted, coefficients=fitted.coefficients * (degrees <= most)[:, None], error_m=error_m)
 
     def __call__(self, east_m: ArrayLike, north_m: ArrayLike) -> Floats:
         """(..., 2) col, row of points in the plane; not finite for points that are infinitely far away.
