@@ -18,6 +18,8 @@ DEGREE = 6
 POWERS = tuple((i, j) for i in range(DEGREE + 1) for j in range(DEGREE + 1 - i))
 _IN_U, _IN_V = np.array(POWERS).T
 _UP_TO = np.arange(DEGREE + 1)
+MAPPED_AT_ONCE = 4096
+"""Points that are mapped to the grid at once: their powers fit into a cache, and one core multiplies them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,26 +87,31 @@ class GridMap:
 
         The shapes are broadcast: the points of a lattice cost least as a row of eastings and a column of northings.
         """
-        u = (np.asarray(east_m, float) - self.centre[0]) / self.scale_m
-        v = (np.asarray(north_m, float) - self.centre[1]) / self.scale_m
+        east, north = np.asarray(east_m, float), np.asarray(north_m, float)
+        if east.shape == north.shape and east.size > MAPPED_AT_ONCE:
+            parts = (np.array_split(of.ravel(), -(-of.size // MAPPED_AT_ONCE)) for of in (east, north))
+            return np.concatenate(list(map(self, *parts))).reshape(*east.shape, 2)
+        u, v = (east - self.centre[0]) / self.scale_m, (north - self.centre[1]) / self.scale_m
         v = v.reshape((1,) * (u.ndim - v.ndim) + v.shape)  # of_u has its axes before the axes of v
         with np.errstate(over="ignore", invalid="ignore"):
-            powers = np.ones((DEGREE + 1, v.size))
-            for power in range(DEGREE):
+            powers = np.ones((len(self._square), v.size))
+            for power in range(len(powers) - 1):
                 np.multiply(powers[power], v.ravel(), out=powers[power + 1])
             # The coefficient of each power of u at each v.
-            of_u = (self._square @ powers).reshape(DEGREE + 1, 2, *v.shape)
-            value = of_u[DEGREE]
-            for power in reversed(range(DEGREE)):
+            of_u = (self._square.reshape(-1, len(powers)) @ powers).reshape(len(powers), 2, *v.shape)
+            value = of_u[-1]
+            for power in reversed(range(len(powers) - 1)):
                 value = value * u + of_u[power]
         return np.stack([value[0], value[1]], axis=-1)
 
     @cached_property
     def _square(self) -> Floats:
-        """((DEGREE + 1) * 2, DEGREE + 1) the coefficients: a row for each power of u and column or row, 0 if none."""
+        """(D + 1, 2, D + 1) the coefficients of each power of u, of column and row, and of each power of v; 0 if none.
+        D: the highest power that any has."""
         square = np.zeros((DEGREE + 1, 2, DEGREE + 1))
         square[_IN_U, :, _IN_V] = self.coefficients
-        return square.reshape(-1, DEGREE + 1)
+        most = max(1, *np.argwhere(square).max(axis=0, initial=0)[[0, 2]].tolist())
+        return square[: most + 1, :, : most + 1].copy()
 
     def jacobian(self, east_m: float, north_m: float) -> Floats:
         """(2, 2) d(col, row) / d(east_m, north_m) at a point."""

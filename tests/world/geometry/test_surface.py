@@ -12,7 +12,7 @@ from pyproj import Transformer
 
 from gcsplan.arrays import Floats
 from gcsplan.world.geodesy.frame import Frame
-from gcsplan.world.geometry.surface import GridMap, Surface
+from gcsplan.world.geometry.surface import MAPPED_AT_ONCE, GridMap, Surface
 from tests.support.effort import draws
 from tests.support.planes import crs_of
 
@@ -113,6 +113,15 @@ def test_an_affine_grid_is_exact() -> None:
     assert grid.to_plane(2.0, 3.0) == pytest.approx([160.0, 1970.0])
     assert grid.to_plane([[2.0, 0.0]], [[3.0, 0.0]]).shape == (1, 2, 2)
     assert grid(np.zeros((3, 4)), np.zeros((3, 4))).shape == (3, 4, 2)
+
+
+@pytest.mark.parametrize("count", [MAPPED_AT_ONCE, MAPPED_AT_ONCE + 1, 2 * MAPPED_AT_ONCE + 7])
+def test_many_places_are_mapped_as_a_few_are(count: int) -> None:
+    east, north = np.random.default_rng(count).uniform(-4000.0, 4000.0, (2, count))
+    for grid in (GridMap.fit(Exact(Frame(47.0, 11.0), 4326, 1 / 1200), (-5000.0, -5000.0, 5000.0, 5000.0)), FLAT):
+        few = np.concatenate([grid(east[k : k + 500], north[k : k + 500]) for k in range(0, count, 500)])
+        assert grid(east, north) == pytest.approx(few, abs=1e-10)
+        assert np.array_equal(grid(east[None, :], north[None, :])[0], grid(east, north))
 
 
 # -- the surface --------------------------------------------------------------------------------------------------
