@@ -34,10 +34,11 @@ CORRIDOR, CORRIDOR_STEPS = 0.08, 8.0
 """Half the width of the corridor around a track: as a part of the straight track, and at least in lattice steps."""
 NARROW, FINE_M = 0.02, 12.0
 """The same around a nearly finished line, as a part of the straight track; spacing of the raster there, in metres."""
-MENDS, SEARCHES = 6, 6
-"""Most exact checks of one line, with a repair after each refusal; most searches on one lattice for a legal track."""
-CLOSER, LEAST_DETOUR = (15_000, 40_000, 120_000), 1.02
-"""If a path is known: about how many nodes the lattices have, in turn; and the least detour that they hold."""
+COARSE_MENDS, MENDS, SEARCHES = 4, 6, 6
+"""Most exact checks of one line, with a repair after each refusal, on a coarse and on a fine guide; most searches on
+one lattice for a legal track."""
+CLOSER, LEAST_DETOUR = 15_000, 1.02
+"""If a path is known: about how many nodes the lattice has, and the least detour that it holds."""
 MOST_OPENED = 200_000
 """Labels expanded on one lattice after which it is given up; such searches wind up and down to gain height."""
 DETOURS, DETOUR_STEPS, DETOUR_PART = (0.2, 0.4, 0.6, 0.8), 4.0, 0.03
@@ -47,7 +48,7 @@ ASIDE = 0.03
 """Half the width of the corridor around a track that is pulled alone, as a part of the straight track."""
 BETTER = 0.5
 """Part of the work left that other tracks and kicks may take once there is a path."""
-LINE_KICKS = 10
+LINE_KICKS = 20
 KICK_PARTS = (0.02, 0.05)
 
 
@@ -85,23 +86,17 @@ def plan_band(problem: Problem, tell: Tell, *, climbs: bool = True) -> Floats:
 def cheaper(problem: Problem, tell: Tell, known: Floats, longest_m: float) -> Floats | None:
     """Way points (N, 3) of a path that is cheaper than a ``known`` one (N, 3); None if none is found.
 
-    The lattices hold tracks of up to about ``longest_m`` metres; the next one is finer. ``tell``: as in `plan_band`.
+    The lattice holds tracks of up to about ``longest_m`` metres. ``tell``: as in `plan_band`.
     """
-    way, cost = straight_way_m(problem), problem.cost(Path(known))
-    detour = max(longest_m / way, LEAST_DETOUR)
-    for nodes in CLOSER:
-        if not problem.budget.goes_on():
-            break
-        tell("search", cost)
-        work = _Work(problem, Router.at(problem, LatticeSize(detour, nodes)), way, climbing_weight(problem))
-        found = [work.first()]
-        if work.line is None or work.line.cost > cost:
-            work.begin(known)
-        found.append(work.improve(tell))
-        best = min((p for p in found if p is not None), key=lambda p: problem.cost(Path(p)), default=None)
-        if best is not None and problem.cost(Path(best)) < cost:
-            return best
-    return None
+    way_m, cost = straight_way_m(problem), problem.cost(Path(known))
+    tell("search", cost)
+    size = LatticeSize(max(longest_m / way_m, LEAST_DETOUR), CLOSER)
+    work = _Work(problem, Router.at(problem, size), way_m, climbing_weight(problem))
+    work.begin_anew()
+    if work.line is None or work.line.value > cost:
+        work.begin(known)
+    found = work.improve(tell)
+    return None if found is None or problem.cost(Path(found)) >= cost else found
 
 
 def pulled(
@@ -112,8 +107,9 @@ def pulled(
     `GuidedTrack`."""
     way_m, over = straight_way_m(problem), sides_to_pass(problem, points, pinned, pin_m)
     points = np.ascontiguousarray(points[:, :2])
-    guide = make_guide(problem, [points], ASIDE * way_m, over)
-    line = guide.pull(line_of(points, pinned, pin_m), np.array(FINE_STEPS) * way_m, COARSE_GAIN * way_m, rounds=2)
+    line = make_guide(problem, [points], ASIDE * way_m, over).pull(
+        line_of(points, pinned, pin_m), np.array(FINE_STEPS) * way_m, COARSE_GAIN * way_m, rounds=2
+    )
     found = _mended(problem, judge, line, over, way_m)[0]
     return None if isinstance(found, Unsettled) else found
 
@@ -125,10 +121,17 @@ def _mended(
 
     Return the way points, or why there are none, and the line as last pulled.
     """
-    found: tuple[Floats, Bools] | Unsettled
     guide = make_guide(problem, [line.points], NARROW * way_m, over, FINE_M)
     line = guide.pull(line, np.array(FINE_STEPS) * way_m, FINE_GAIN * way_m, rounds=3)
-    for attempt in range(MENDS):
+    return _settled(problem, judge, guide, line, way_m, MENDS)
+
+
+def _settled(
+    problem: Problem, judge: LegJudge, guide: CorridorRaster, line: GuidedTrack, way_m: float, mends: int
+) -> tuple[tuple[Floats, Bools] | Unsettled, GuidedTrack]:
+    """`_mended` of a line that was pulled in ``guide``, which is corrected; ``mends``: most exact checks."""
+    found: tuple[Floats, Bools] | Unsettled
+    for attempt in range(mends):
         found = settle(problem, judge, line.points, line.pinned, line.pin_m)
         if not isinstance(found, Unsettled):
             break
@@ -140,9 +143,8 @@ def _mended(
         elif why.kind in ("pinched", "zone"):
             guide.narrow(why.place, 1e4)
         elif attempt:
-            guide.strict()
-        steps = FINE_STEPS if attempt < 2 else COARSE_STEPS
-        line = guide.pull(line, np.array(steps) * way_m, COARSE_GAIN * way_m)
+            guide.strict(why.by)
+        line = guide.pull(line, np.array(FINE_STEPS if attempt < 3 else COARSE_STEPS) * way_m, COARSE_GAIN * way_m)
         if not problem.budget.goes_on():
             break
     return found, line
@@ -209,9 +211,12 @@ class _Work:
             line = self._line(way)
             self.guide = self._guide([line.points])
             line = self.guide.pull(line, self._steps(COARSE_STEPS), COARSE_GAIN * self.way_m, rounds=2)
-            found, line = self._mended(line)
+            # Most lines are legal after a mend or two on the coarse guide, which takes a third of the fine one's time.
+            found, settled = _settled(self.problem, self.judge, self.guide, line, self.way_m, COARSE_MENDS)
+            if isinstance(found, Unsettled):
+                found, settled = self._mended(line)
             if not isinstance(found, Unsettled):
-                self.line = line
+                self.line = settled
                 return found[0]
             self.router.last_place = found.place
             self.router.last = Obstruction(found.kind, 0.0, found.span_m, found.by, found.zone)
@@ -223,6 +228,14 @@ class _Work:
             else:
                 self.router.climb_factor *= 0.95
         return None
+
+    def begin_anew(self) -> None:
+        """Take the line pulled from the best track over the lattice, if there is one; it need not be legal."""
+        way = self.router.way(weight=self.weight, briefly=True)
+        if way is not None:
+            self.guide = self._guide([way])
+            line = self.guide.pull(self._line(way), self._steps(COARSE_STEPS), COARSE_GAIN * self.way_m, rounds=2)
+            self.line = self.guide.pull(line, self._steps(FINE_STEPS), FINE_GAIN * self.way_m, rounds=3)
 
     def begin(self, points: Floats) -> None:
         """Take the line pulled from the track of a path (N, 3). Zones are passed over or under as that path does."""
@@ -276,8 +289,9 @@ class _Work:
         return line_of(track.points, track.pinned, track.pin_m)
 
     def _guide(self, ways: list[Floats]) -> CorridorRaster:
-        radius = max(CORRIDOR * self.way_m, CORRIDOR_STEPS * self.router.lattice.step_m)
-        return make_guide(self.problem, ways, radius, self.over)
+        return make_guide(
+            self.problem, ways, max(CORRIDOR * self.way_m, CORRIDOR_STEPS * self.router.lattice.step_m), self.over
+        )
 
     def _steps(self, parts: tuple[float, ...]) -> Floats:
         return np.array(parts) * self.way_m
@@ -289,8 +303,7 @@ class _Work:
         """Other tracks over the lattice: around discs closed on the first."""
         assert self.line is not None
         router, p, ways = self.router, self.problem, list[Floats]()
-        s = distances_m(self.line.points)
-        floor = router.lattice.floor_m
+        s, floor = distances_m(self.line.points), router.lattice.floor_m
         for f in DETOURS:
             if not p.budget.goes_on() or router.opened > MOST_OPENED // 4:
                 break
@@ -313,9 +326,10 @@ class _Work:
         across = np.array([-along[1], along[0]])
         bump = np.maximum(0.0, 1.0 - np.abs(s - at) / half) * ~line.pinned
         points = line.points + bump[:, None] * (side * across)
-        middle = np.array([np.interp(at, s, line.points[:, k]) for k in range(2)]) + side * across
         return GuidedTrack(
-            np.insert(points, i + 1, middle, axis=0),
+            np.insert(
+                points, i + 1, [np.interp(at, s, line.points[:, k]) + side * across[k] for k in range(2)], axis=0
+            ),
             np.insert(line.pinned, i + 1, False),
             np.insert(line.pin_m, i + 1, math.nan),
             np.insert(line.amsl_m, i + 1, 0.0),

@@ -13,8 +13,8 @@ EARLY_OF_REST = 0.25
 
 
 class LatticeSearch(Search):
-    """If no path is known, and once more beyond a gap of `FAR`; under a maximum AGL once, beyond `BAND_FAR`. Where path
-    and bound are far apart it finds other valleys; else it gains little, and takes long. Remembers nothing."""
+    """If no path is known, and once more beyond a gap of `FAR`, under a maximum AGL of `BAND_FAR`. Where path and bound
+    are far apart it finds other valleys; else it gains little, and takes long. Remembers nothing."""
 
     NAME, IMPROVES, SHARE, ANEW = "lattice", "paths", 0.02, True
     FIRST, FAR_APART, BAND = (0.5, 1.0), (0.25, 0.3), (0.9, 0.5)
@@ -33,17 +33,10 @@ class LatticeSearch(Search):
             return self.FIRST
         return self.FAR_APART if self.incumbent.gap > WIDE else (self.SHARE, self.FAR_APART[1])
 
-    def is_open(self) -> bool:
-        """Once; without a maximum AGL once more if it ran without a path."""
-        if self.seen is not None and self.problem.limits.max_agl_m is not None:
-            return False
-        return super().is_open()
-
     def applies(self) -> bool:
         """Whether no path is known, or the gap is large."""
-        i = self.incumbent
-        band = self.problem.limits.max_agl_m is not None
-        return i.best is None or i.gap > (BAND_FAR if band else FAR)
+        i, far = self.incumbent, FAR if self.problem.limits.max_agl_m is None else BAND_FAR
+        return i.best is None or i.gap > far
 
     def size(self) -> Size:
         """Its work is not known before; it gets a part of the rest."""

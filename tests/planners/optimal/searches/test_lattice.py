@@ -58,9 +58,14 @@ def test_near_the_bound_it_does_not_run() -> None:
     assert not search.is_open()
 
 
-def test_under_a_maximum_agl_it_runs_once_and_soon() -> None:
+def test_under_a_maximum_agl_it_runs_soon_and_again_after_a_first_path_that_is_a_little_off() -> None:
     search = lattice(100.0)
     assert search.share == search.BAND[0]
     search.choose()
-    know(search, 0.2)
+    know(search, 0.002)
+    assert not search.is_open()
+    know(search, 0.003)
+    assert search.is_open()
+    search.choose()
+    know(search, 0.0029)
     assert not search.is_open()
