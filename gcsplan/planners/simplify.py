@@ -23,7 +23,7 @@ MOVE_ROUNDS = 24
 SHARE = 0.3
 """Part of the counted work left that the moves of one path may take: legs along a zone over a slope take long."""
 LAST_GAIN = 2e-6
-"""A round that gains at most this part of the cost is the last."""
+"""A round that gains at most this part of the cost is the last, if no more is said."""
 
 WAY_POINT_PRICE = 2e-5
 """The most that a path may become dearer for one way point less, as a part of its cost."""
@@ -32,9 +32,10 @@ OPEN, LEGAL, SHUT = 0, 1, 2
 """State of a choice: not checked, all its legs are legal, or one of them is not."""
 
 
-def polished(problem: Problem, points: Floats, pinned: Bools) -> tuple[Floats, Bools]:
+def polished(problem: Problem, points: Floats, pinned: Bools, last_gain: float = LAST_GAIN) -> tuple[Floats, Bools]:
     """Move free points towards the lines between their neighbours as far as is legal: in space, in the plane alone, or
-    in altitude alone. Returns the points (N, 3) and ``pinned`` (N,), which of them are terminals, unchanged."""
+    in altitude alone. Returns the points (N, 3) and ``pinned`` (N,), which of them are terminals, unchanged.
+    ``last_gain``: a round that gains at most this part of the cost is the last."""
     cost = problem.cost_through(points)
     points = points.copy()
     still = np.zeros(len(points), np.bool_)
@@ -45,7 +46,7 @@ def polished(problem: Problem, points: Floats, pinned: Bools) -> tuple[Floats, B
             _move(problem, points, pinned, still, k % 2)
             if k % 2:
                 now = problem.cost_through(points)
-                if cost - now <= LAST_GAIN * cost:
+                if cost - now <= last_gain * cost:
                     break
                 cost = now
     return points, pinned

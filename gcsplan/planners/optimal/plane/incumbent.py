@@ -15,7 +15,7 @@ from gcsplan.planners.profile.climb_laps import pins_of, with_laps
 from gcsplan.planners.profile.exact import LegJudge, Unsettled, settle, way_points
 from gcsplan.planners.profile.track import Flown, Obstruction, Track, fly, make_track
 from gcsplan.planners.profile.zone_levels import may_pass
-from gcsplan.planners.simplify import fewer, polished
+from gcsplan.planners.simplify import LAST_GAIN, fewer, polished
 from gcsplan.world.geometry.path import Path, track_length_m
 
 STRAIGHTER = 5e-6
@@ -61,14 +61,14 @@ class Incumbent:
 
     # ------------------------------------------------------------------------------------------------- paths
 
-    def take_along(self, terminals: PinnedTrack) -> bool:
-        """Look for a path over a track; return whether it is the best so far."""
+    def take_along(self, terminals: PinnedTrack, *, fine: bool = True) -> bool:
+        """Look for a path over a track; return whether it is the best so far. ``fine``: see `take_simpler`."""
         track = make_track(self.problem, *terminals)
         flown = fly(self.problem, track)
         if not isinstance(flown, Flown) and not may_pass(self.problem, track, flown):
             return False
         found = self.exact(track, flown)
-        return not isinstance(found, Unsettled) and self.take_simpler(*found, fine=True, longer=False)
+        return not isinstance(found, Unsettled) and self.take_simpler(*found, fine=fine, longer=False)
 
     def take_longer(self, terminals: PinnedTrack, fine: bool) -> bool:
         """Look for a path over a track, with laps where it is too steep; return whether it is the best so far."""
@@ -89,11 +89,14 @@ class Incumbent:
                 return found
         return settle(self.problem, self.judge, track.points, track.pinned, track.pin_m)
 
-    def take_simpler(self, points: Floats, pinned: Bools, *, fine: bool, longer: bool) -> bool:
+    def take_simpler(
+        self, points: Floats, pinned: Bools, *, fine: bool, longer: bool, last_gain: float = LAST_GAIN
+    ) -> bool:
         """Simplify a path and keep it if it is then the best so far; do nothing if that is unlikely (`HOPE`).
 
-        ``fine``, ``longer``: the kind of path, that is, whether its track is of the fine lattice and whether the track
-        was made longer. Returns whether the path was kept.
+        ``fine``, ``longer``: the kind of path, that is, whether its track is of the fine lattice, and worth being drawn
+        tight point by point, and whether the track was made longer. ``last_gain``: see `polished`. Returns
+        whether the path was kept.
         """
         self._first()
         cost = self.problem.cost(Path(points))
@@ -104,7 +107,7 @@ class Incumbent:
         self._simplified.add(as_given)
         points, pinned = fewer(self.problem, points, pinned, STRAIGHTER * cost)
         if fine:
-            points, pinned = polished(self.problem, points, pinned)
+            points, pinned = polished(self.problem, points, pinned, last_gain)
         gained = cost / max(self.problem.cost(Path(points)), 1e-9) - 1.0  # a level flight may cost nothing
         self._gained[fine, longer] = max(self._gained.get((fine, longer), 0.0), gained)
         return self.take(points, pinned)

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from gcsplan.planners.optimal.loop.search import BAND_FAR, Search, Size
 from gcsplan.planners.profile.cross_sections import tightened
+from gcsplan.planners.simplify import LAST_GAIN
 
 DESCENT_S = 0.1
+LAST_OF_GAP = 0.005
+"""Part of the gap that a round of small moves must close, or it is the last."""
 
 
 class SectionDescent(Search):
@@ -32,4 +35,6 @@ class SectionDescent(Search):
         incumbent = self.incumbent
         assert incumbent.best is not None
         points, pinned = tightened(self.problem, incumbent.best)
-        incumbent.take_simpler(points, pinned, fine=True, longer=False)
+        incumbent.take_simpler(
+            points, pinned, fine=True, longer=False, last_gain=max(LAST_GAIN, LAST_OF_GAP * incumbent.gap)
+        )

@@ -144,7 +144,8 @@ class SectionChains(Search):
         chain = looked.chain() if math.isfinite(looked.bound) else None
         self._looked = None if chain is None else looked
         if chain is not None:
-            incumbent.take_along(sections.track_of(chain))
+            # Drawing chains tight took a third of the time here, and gained 0.006 % at most.
+            incumbent.take_along(sections.track_of(chain), fine=False)
         incumbent.raise_bound(min(looked.bound, aim))
         halved = before is not None and len(sections.lines) > len(before.sections.lines)
         little = gap - (incumbent.cost - incumbent.bound) < WORTH_MORE * gap
