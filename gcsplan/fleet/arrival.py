@@ -378,7 +378,7 @@ class NoSchedule(NoMission):
 
 
 def schedule(
-    crews: Sequence[Crew],
+    crews: Sequence[Crew | Craft],
     mode: Mode,
     *,
     order: Sequence[str] | Literal["best"] | None = None,
@@ -404,7 +404,7 @@ def schedule(
     Raises NoSchedule if a vehicle cannot comply, with the smallest interval or the earliest arrival that works. With
     ``leave_out`` only if none can; otherwise the others keep their turns, and ``left_out`` has the errors.
     """
-    craft = [Craft(c) for c in crews]
+    craft = [c if isinstance(c, Craft) else Craft(c) for c in crews]
     if not craft or len({c.name for c in craft}) != len(craft):
         raise ValueError("a schedule needs vehicles of different names")
     if mode == "none":

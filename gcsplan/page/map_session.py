@@ -15,10 +15,11 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, Protocol
 
-from gcsplan.app.plan.model import Plan
+from gcsplan.app.plan.model import Plan, VehiclePlan
 from gcsplan.app.plan.way_home import home_of, homes_of, is_required
 from gcsplan.app.session import BetterPath, Planner, path_of
 from gcsplan.check.returns.verdict import WayHome
+from gcsplan.check.verdict import Verdict
 from gcsplan.errors import Cancelled, GcsplanError, InputError, Mistake, NoMission, cancelled_by
 from gcsplan.mission_file.kept import KeptWorld
 from gcsplan.mission_file.load import MOST_VEHICLES_OF_FILE, zones_by_entry
@@ -116,6 +117,7 @@ class MapSession:
         self._followed = False  # a path of the drag was shown
         self._owed = False
         self._homeless: tuple[int, Plan] | None = None  # a plan, with its n, whose way home is to be sent
+        self._homes: dict[str, tuple[tuple[object, ...], Verdict, WayHome]] = {}
         self._costs: dict[str, float] = {}
         self._problems: tuple[Mistake, ...] = ()
         self._zones, self._drawn = KeptWorld(), DrawnZones()
@@ -440,11 +442,20 @@ class MapSession:
             return
         n, plan = self._homeless
         with suppress(Cancelled), cancelled_by(lambda: self._superseded):
-            found: dict[str, WayHome] = {
-                v.name: home_of(v.verdict, v.request, plan.world, plan.source.terrain_error_m) for v in plan.vehicles
-            }
+            found = {v.name: self._home_of(v, plan) for v in plan.vehicles}
+            self._homes = {name: self._homes[name] for name in found}
             self._homeless = None
             self._send(answers.home_answer(n, plan, found, self._units))
+
+    def _home_of(self, v: VehiclePlan, plan: Plan) -> WayHome:
+        """The way home of a vehicle; the one before if its mission and what it flies over are the same."""
+        air, error_m = plan.world.airspace, plan.source.terrain_error_m
+        made_of = (id(v.verdict), v.request, air.surface, air.zones, error_m)
+        known = self._homes.get(v.name)
+        if known is None or known[0] != made_of:
+            home = home_of(v.verdict, v.request, plan.world, error_m)
+            known = self._homes[v.name] = (made_of, v.verdict, home)  # the verdict stays, so its id is its own
+        return known[2]
 
     def _send_scene(self) -> None:
         """Send the plan in space, if the page shows it."""

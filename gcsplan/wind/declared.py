@@ -66,6 +66,12 @@ class DeclaredWind:
         )
 
     @property
+    def key(self) -> tuple[object, ...]:
+        """The same of two sets exactly if they have the same winds."""
+        arrays = (self.speed_m_s, self.from_deg, self.heights_m, self.times_s)
+        return (*(a.tobytes() for a in arrays), self.speed_m_s.shape, self.heights, self.varying, self.gust_m_s)
+
+    @property
     def constant_m_s(self) -> tuple[float, float] | None:
         """The one wind that blows at all heights and hours, to east and to north, m/s; None if another one may blow."""
         if not self.single or self.speed_m_s.size != 2 or self.gusts_add_m_s:

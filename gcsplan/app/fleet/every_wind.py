@@ -14,7 +14,7 @@ import numpy as np
 
 from gcsplan.app.fleet.gates import having, waits_for_time
 from gcsplan.app.plan.model import Brief, FleetPlan, VehiclePlan
-from gcsplan.app.plan.problem import built
+from gcsplan.app.plan.problem import built_again
 from gcsplan.app.plan.vehicle import rebuilt
 from gcsplan.errors import NoMission
 from gcsplan.figures import floored, raised
@@ -317,7 +317,7 @@ def _judged_works(again: Retimed, vehicles: Sequence[VehiclePlan], brief: Brief)
     try:
         tried = []
         for v in vehicles:
-            mission, verdict = built(brief, v.request, v.solution, v.order)
+            mission, verdict = built_again(v, brief, v.order)
             tried.append(replace(v, mission=mission, verdict=verdict))
     except NoMission:
         return False

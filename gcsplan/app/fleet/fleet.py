@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -266,15 +267,15 @@ def _fleet_of(
         plan = schedule(crews, "none")
     else:
         detours = Detours(
-            vehicles, brief, rules_of(arrival, vehicles, world), lambda v: route_of(v, world),
+            vehicles, brief, partial(rules_of, arrival, vehicles, world), lambda v: route_of(v, world),
             lambda v: on_way([v], LeavingOut(allowed=False))[0] if v.name in waiting else v,
         )  # fmt: skip
         requested, notes = _scheduled(crews, arrival, detours, leaving)
         plan = requested
         if any(drifts(v) for v in vehicles):
-            plan = _kept_in_wind(requested, vehicles, crews, brief, gate, detours, leaving)
+            plan = _kept_in_wind(requested, crews, brief, gate, detours, leaving)
         elif len(plan.slots) > 1:
-            plan = _kept_apart(plan, vehicles, crews, brief, arrival, detours, leaving)
+            plan = _kept_apart(plan, crews, brief, arrival, detours, leaving)
         placed = {slot.name: slot for slot in plan.slots}
         vehicles = [detours.plan_of(v.name, placed[v.name].route) for v in vehicles if v.name in placed]
         crews = [crew_of(v, world) for v in vehicles]
@@ -340,8 +341,8 @@ def _paced(crew: Crew, speeds: SpeedRange) -> Crew:
 
 
 def _kept_in_wind(
-    requested: Schedule, vehicles: Sequence[VehiclePlan], crews: Sequence[Crew], brief: Brief, gate: GateTime | None,
-    detours: Detours, leaving: LeavingOut,
+    requested: Schedule, crews: Sequence[Crew], brief: Brief, gate: GateTime | None, detours: Detours,
+    leaving: LeavingOut,
 ) -> Schedule:  # fmt: skip
     """The schedule with its intervals in the middle of what the declared winds make of them, and kept apart in each.
 
@@ -367,7 +368,7 @@ def _kept_in_wind(
         ]  # fmt: skip
         before = {slot.name: (slot.speed_m_s, slot.route) for slot in plan.slots}
         if len(plan.slots) > 1:
-            plan = _kept_apart(plan, vehicles, crews, brief, arrival, detours, leaving)
+            plan = _kept_apart(plan, crews, brief, arrival, detours, leaving)
         if all(before[slot.name] == (slot.speed_m_s, slot.route) for slot in plan.slots):
             break
     return plan
@@ -518,11 +519,12 @@ def _scheduled(
 
     If the file does not set `clock`, the first vehicle's clock is tried, then that of the whole fleet.
     """
-    names = {c.name for c in crews}
+    crafts = [Craft(c) for c in crews]
+    names = {c.name for c in crafts}
 
     def by_clock(clock: Literal["first", "fleet"], *, leave_out: bool) -> Schedule:
         plan = schedule(
-            crews, arrival.mode,
+            crafts, arrival.mode,
             order="best" if arrival.best_order else [name for name in arrival.order if name in names],
             interval_s=arrival.interval_s, hold=arrival.hold, clock=clock, arrive_s=arrival.arrive_s,
             longer=detours.longer, leave_out=leave_out,
@@ -539,7 +541,7 @@ def _scheduled(
             raise
     plan = by_clock("fleet", leave_out=leaving.allowed)
     first = plan.slots[0]
-    alone_s = min(Craft(c).fast_s for c in crews if c.name == first.name)
+    alone_s = min(c.fast_s for c in crafts if c.name == first.name)
     note = Note(
         "clock_of_fleet", first=first.name, arrive_s=first.arrive_s, alone_s=alone_s, interval_s=plan.interval_s
     )  # fmt: skip
@@ -548,7 +550,6 @@ def _scheduled(
 
 def _kept_apart(
     plan: Schedule,
-    vehicles: Sequence[VehiclePlan],
     crews: Sequence[Crew],
     brief: Brief,
     arrival: ArrivalRequest,
@@ -559,7 +560,7 @@ def _kept_apart(
     from gcsplan.fleet.resolve import resolve  # imported here because most plans have one vehicle
 
     settled = resolve(
-        plan, crews, rules_of(arrival, vehicles, brief.world),
+        plan, crews, detours.rules,
         priority=[name for name in arrival.order if name in plan.order] if brief.by_priority else None,
         hold=arrival.hold,
         later_s=0.0 if arrival.arrive_s is not None else LATER_S,

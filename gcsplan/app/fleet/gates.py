@@ -18,7 +18,7 @@ import numpy as np
 
 from gcsplan.app.plan.left_out import LeavingOut
 from gcsplan.app.plan.model import Brief, VehiclePlan
-from gcsplan.app.plan.problem import built
+from gcsplan.app.plan.problem import built_again
 from gcsplan.app.plan.vehicle import rebuilt
 from gcsplan.errors import InputError, NoMission
 from gcsplan.fleet.arrival import Slot
@@ -142,7 +142,7 @@ def gates_bought(v: VehiclePlan, slot: Slot, brief: Brief) -> VehiclePlan:
     if v.order.gates is None:
         return v
     waits = [leg for leg in v.verdict.legs if leg.until_s is not None]
-    without = built(brief, v.request, v.solution, replace(v.order, gates=None))[1]
+    without = built_again(v, brief, replace(v.order, gates=None))[1]
     after, before = v.verdict.arrive_window_s(slot), without.arrive_window_s()
     takes_j = v.verdict.reported_j(math.fsum(leg.hold_j for leg in waits))
     note = Note(

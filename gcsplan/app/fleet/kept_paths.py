@@ -8,8 +8,9 @@ terrain and zones of the mission that is read anew.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
-from gcsplan.app.fleet.vehicle_plans import Answer, restored
+from gcsplan.app.fleet.vehicle_plans import Answer, over_levels
 from gcsplan.app.plan.left_out import LeftOut
 from gcsplan.app.plan.model import Brief, VehiclePlan
 from gcsplan.mission_file.kept import is_kept
@@ -37,12 +38,13 @@ class KeptPaths:
         same = _without(self._of[1], "arrival") == _without(content, "arrival")
         if not same and (brief.options.get("warm_start") is not None or brief.world is not self._world):
             return plans, left_out  # a plan depends on another vehicle's, or the plane or its ground is another one
+        over = over_levels(brief)
         for request in brief.source.vehicles:
             name = request.vehicle.name
             if name in self._answers:
                 plan, level = self._answers[name]
                 if same or (plan.request == request and level == brief.source.level):
-                    plans[name] = restored(brief, plan, level)
+                    plans[name] = plan.restored(over(level))
             elif name in self._left_out and allowed:
                 of, left = self._left_out[name]
                 if same or of == request:
@@ -58,7 +60,10 @@ class KeptPaths:
         requests = {request.vehicle.name: request for request in brief.source.vehicles}
         self._of = brief.packed(), content
         self._world = brief.world if is_kept(brief.world.airspace.surface) else None
-        self._answers = {v.name: (v.packed(), v.brief.source.level) for v in vehicles if v.brief is not None}
+        self._answers = {
+            v.name: (replace(v.packed(), built_last=v.built_last), v.brief.source.level)
+            for v in vehicles if v.brief is not None
+        }  # fmt: skip
         self._left_out = {left.name: (requests[left.name], left) for left in left_out}
 
 

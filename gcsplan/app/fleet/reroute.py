@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -48,13 +49,18 @@ class Detours:
     """
 
     def __init__(
-        self, vehicles: Sequence[VehiclePlan], brief: Brief, rules: Rules, route_of: Callable[[VehiclePlan], Route],
-        gated: Callable[[VehiclePlan], VehiclePlan],
+        self, vehicles: Sequence[VehiclePlan], brief: Brief, rules: Callable[[], Rules],
+        route_of: Callable[[VehiclePlan], Route], gated: Callable[[VehiclePlan], VehiclePlan],
     ) -> None:  # fmt: skip
         self._plans, self._gated = {v.name: v for v in vehicles}, gated
-        self._brief, self._rules, self._route_of = brief, rules, route_of
+        self._brief, self._rules_of, self._route_of = brief, rules, route_of
         self._found: list[tuple[Route, VehiclePlan]] = []
         self._known: dict[object, Route | None] = {}
+
+    @cached_property
+    def rules(self) -> Rules:
+        """The separation of the vehicles on their first paths."""
+        return self._rules_of()
 
     def plan_of(self, name: str, route: Route) -> VehiclePlan:
         """The plan that a route was made from: one of these detours, or the vehicle's first plan."""
@@ -104,7 +110,7 @@ class Detours:
     def _higher(self, name: str, avoid: Sequence[Conflict]) -> Route | None:
         request = self._plans[name].request
         limits = request.vehicle.limits
-        low_m = limits.min_agl_m + self._rules.needed_m + DETOUR_SPARE_M
+        low_m = limits.min_agl_m + self.rules.needed_m + DETOUR_SPARE_M
         if limits.max_agl_m is not None and low_m + 2.0 * limits.altitude_error_m > limits.max_agl_m:
             return None
         return self._planned(name, request, limits=replace(limits, min_agl_m=low_m))
@@ -112,9 +118,9 @@ class Detours:
     def _round(self, name: str, avoid: Sequence[Conflict], wider: float) -> Route | None:
         request, air = self._plans[name].request, self._brief.world.airspace
         limits = request.vehicle.limits
-        radius_m = wider * self._rules.needed_m + DETOUR_SPARE_M
+        radius_m = wider * self.rules.needed_m + DETOUR_SPARE_M
         reach_m = radius_m + limits.horizontal_clearance_m + limits.track_error_m
-        half_m = self._rules.needed_m + limits.altitude_error_m + DETOUR_SPARE_M
+        half_m = self.rules.needed_m + limits.altitude_error_m + DETOUR_SPARE_M
         discs = []
         for i, conflict in enumerate(avoid):
             east, north, amsl = conflict.worst.middle

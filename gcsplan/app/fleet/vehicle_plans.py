@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import cache
 
 from gcsplan.app.fleet.fleet import finished
 from gcsplan.app.fleet.may_fly import flyable
@@ -28,7 +29,7 @@ from gcsplan.planners.problem import Problem, Progress, Refusal, Solution
 from gcsplan.planners.refusal.suggestions import with_cures
 from gcsplan.world.world import World
 
-__all__ = ["PIECE_S", "Answer", "plan_or_explain", "planned_by", "restored"]
+__all__ = ["PIECE_S", "Answer", "over_levels", "plan_or_explain", "planned_by"]
 
 PIECE_S = 0.6
 """Seconds that planning a vehicle takes, about: the median of 60 over mountains with margins."""
@@ -122,7 +123,8 @@ def planned_by(
     for number, why in sorted(refused.items()):
         if isinstance(why, NoMission):
             leaving.leave(names[number], why)
-    return [restored(brief, *answers[k]) for k in sorted(answers)]
+    over = over_levels(brief)
+    return [plan.restored(over(level)) for _, (plan, level) in sorted(answers.items())]
 
 
 def answer_of(site_and_brief: SiteAndBrief, name: str) -> Answer | GcsplanError:
@@ -138,7 +140,12 @@ def answer_of(site_and_brief: SiteAndBrief, name: str) -> Answer | GcsplanError:
     return plan.packed(), plan.brief.source.level
 
 
-def restored(brief: Brief, plan: VehiclePlan, level: int) -> VehiclePlan:
-    """A packed plan over the mission's terrain of the level that it was made over. Raises InputError."""
-    source = widened(brief.source, level)
-    return plan.restored(brief if source is brief.source else brief.over(source, world_of(source)))
+def over_levels(brief: Brief) -> Callable[[int], Brief]:
+    """A function that puts the brief over the mission's terrain of a level, each made once. It raises InputError."""
+
+    @cache
+    def over(level: int) -> Brief:
+        source = widened(brief.source, level)
+        return brief if source is brief.source else brief.over(source, world_of(source))
+
+    return over

@@ -21,6 +21,7 @@ from gcsplan.fleet.motion.timing import TimedPath
 from gcsplan.mavlink.build.order import Order
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.mission_file import MissionFile, VehicleRequest
+from gcsplan.mission_file.kept import Latest
 from gcsplan.notes.note import Note
 from gcsplan.planners.problem import Problem, Solution, gap_percent
 from gcsplan.planners.registry import get as get_planner
@@ -35,6 +36,9 @@ Named = TypeVar("Named", Slot, TimedPath)
 
 OUTPUTS = "gcsplan.app.output.files"
 """The module that makes documents of a plan, named as the table of planners names theirs: it is imported at need."""
+
+MOST_BUILT = 6
+"""Most missions of one path that are kept: a time table tries a few speeds, in a session again and again."""
 
 MOST_VEHICLES_SHOWN = 4
 """Most vehicles that a plan's ``repr`` names."""
@@ -100,7 +104,10 @@ class Brief:
 
 @dataclass(frozen=True, eq=False)
 class VehiclePlan:
-    """One vehicle's request and all results for it. ``brief`` holds the terrain that it was planned over."""
+    """One vehicle's request and all results for it. ``brief`` holds the terrain that it was planned over.
+
+    ``built_last``: the missions of its path that were built and judged last, shared by all plans made from this one.
+    """
 
     request: VehicleRequest
     problem: Problem
@@ -111,6 +118,7 @@ class VehiclePlan:
     notes: tuple[Note, ...] = ()
     order: Order = field(default_factory=Order)
     brief: Brief | None = None
+    built_last: Latest[tuple[Mission, Verdict]] = field(default_factory=lambda: Latest(MOST_BUILT))
 
     def __post_init__(self) -> None:
         """Raise GcsplanError where a mission that passes costs less than its lower bound: then one of both is wrong."""
@@ -156,7 +164,8 @@ class VehiclePlan:
     def packed(self) -> VehiclePlan:
         """The plan without its terrain, for another process; `restored` is the way back."""
         problem = replace(self.problem, airspace=None, widen=None, progress=None)  # type: ignore[arg-type]
-        return replace(self, problem=problem, solution=replace(self.solution, problem=None), brief=None)
+        solution, unknown = replace(self.solution, problem=None), Latest[tuple[Mission, Verdict]](MOST_BUILT)
+        return replace(self, problem=problem, solution=solution, brief=None, built_last=unknown)
 
     def restored(self, over: Brief) -> VehiclePlan:
         """A `packed` plan over the terrain of ``over``, under which it was made."""

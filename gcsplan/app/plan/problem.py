@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
-from gcsplan.app.plan.model import Brief
+from gcsplan.app.plan.model import Brief, VehiclePlan
 from gcsplan.arrays import Floats
 from gcsplan.check.judge import judge
 from gcsplan.check.motion.project import why_unknown
@@ -88,7 +88,18 @@ def looked_over(brief: Brief, solution: Solution) -> Brief:
     return brief.over(over.source, world)
 
 
+def built_again(v: VehiclePlan, brief: Brief, order: Order) -> tuple[Mission, Verdict]:
+    """`built` for a vehicle's path; what it was before, if nothing has changed of what it depends on."""
+    source, air, frame = brief.source, brief.world.airspace, brief.world.frame
+    wind = source.flight_wind(v.request)
+    blows = None if wind is None else (wind.declared.key, wind.departs_s, wind.late_s)
+    place = frame.lat_deg, frame.lon_deg, frame.amsl_m
+    key = v.solution.path, order, v.request, blows, source.terrain_error_m, air.surface, air.zones, air.scale, place
+    return v.built_last.get(key, lambda: built(brief, v.request, v.solution, order))
+
+
 def built(brief: Brief, request: VehicleRequest, solution: Solution, order: Order) -> tuple[Mission, Verdict]:
+    """The mission of a path, and the check of it. Raises NoMission if it has more items than the autopilot takes."""
     heed_cancel()
     vehicle, source = request.vehicle, brief.source
     mission = build_mission(solution.path, brief.world, vehicle, request.start_deg, order)

@@ -9,7 +9,7 @@ import numpy as np
 
 from gcsplan.app.plan.left_out import LeavingOut
 from gcsplan.app.plan.model import Brief, VehiclePlan
-from gcsplan.app.plan.problem import bow_margin_m, built, looked_over, make_problem, run_planner, unsafe
+from gcsplan.app.plan.problem import bow_margin_m, built, built_again, looked_over, make_problem, run_planner, unsafe
 from gcsplan.app.plan.replanning import Attempts, on_path, replanned
 from gcsplan.arrays import Floats
 from gcsplan.check.verdict import Verdict
@@ -164,7 +164,7 @@ def over_one_terrain(
         if v.brief is None or v.brief.source is wide.source:
             out.append(v)
             continue
-        mission, verdict = built(wide, v.request, v.solution, v.order)
+        mission, verdict = built_again(v, wide, v.order)
         if not verdict.findings:
             out.append(replace(v, mission=mission, verdict=verdict, brief=wide))
             continue
@@ -195,7 +195,7 @@ def rebuilt(
     if order.gates is not None:
         order, mission, verdict = _opening(replace(v, order=order), over, order.gates, depart_s, v.order.speed_m_s)
     elif order != v.order:
-        mission, verdict = built(over, v.request, v.solution, order)
+        mission, verdict = built_again(v, over, order)
     if order == v.order:
         return v
     if verdict.findings:
@@ -214,7 +214,7 @@ def _opening(
         if len(after_s) == len(gates.at_m):
             gates = replace(gates, opens_s=tuple(round(leaves_s + s) for s in after_s))
         order = replace(v.order, gates=replace(gates, leaves_s=leaves_s))
-        mission, verdict = built(brief, v.request, v.solution, order)
+        mission, verdict = built_again(v, brief, order)
         found_s = verdict.gates_after_s()
         if found_s == after_s:
             break

@@ -8,6 +8,7 @@ import pytest
 
 from gcsplan.app.fleet.kept_paths import KeptPaths
 from gcsplan.app.fleet.pipeline import plan_again
+from gcsplan.app.output.files import outputs_of
 from gcsplan.app.parallel.sites import world_of
 from gcsplan.app.plan.model import PlanOptions
 from gcsplan.app.session import BetterPath, Planner
@@ -41,6 +42,25 @@ def test_another_arrival_needs_no_search_and_gives_the_same_missions() -> None:
     session.change({"limits.min_agl_m": 41})
     session.plan(on_path=lambda better: heard.append(better.vehicle))
     assert set(heard) == {"a", "b"}
+
+
+@pytest.mark.slow
+def test_missions_that_stay_are_not_judged_again_and_changes_of_the_world_are() -> None:
+    session = Planner(PAIR | {"wind": {"up_to_m_s": 3}})
+    first = session.plan()
+    session.change({"arrival.interval_s": 35})
+    again = session.plan()
+    # The second flies slower.
+    assert [a.verdict is b.verdict for a, b in zip(first.vehicles, again.vehicles, strict=True)] == [True, False]
+    assert [slot.arrive_s for slot in first.fleet.slots] != [slot.arrive_s for slot in again.fleet.slots]  # type: ignore[union-attr]
+    for change in ({"wind.up_to_m_s": 3.5}, {"vehicles.a.energy": {"battery_j": 1e6}, "vehicles.b.end": "none"},
+                   {"no_fly": [{"name": "z", "center": {"east_m": 350, "north_m": 900}, "radius_m": 50}]},
+                   {"terrain": {"flat_m": 120}}):  # fmt: skip
+        session.change(change)
+        other, anew = session.plan(), Planner(session.mission).plan()
+        assert not {id(v.verdict) for v in first.vehicles} & {id(v.verdict) for v in other.vehicles}
+        assert outputs_of(other) == outputs_of(anew)
+        first = other
 
 
 def test_another_objective_or_a_vehicle_left_out_before_is_searched_anew() -> None:
