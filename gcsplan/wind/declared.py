@@ -157,6 +157,9 @@ class DeclaredWind:
 
         (N, C) with ``rows`` (N,): the row of ``levels`` for each point.
         """
+        if self.speed_m_s.size == 2:  # the same at all heights and hours
+            one = levels[:, 0, 0] + 0.0
+            return np.repeat(one[:, None], len(at_s), axis=1) if isinstance(rows, slice) else one[rows]
         t0, t1, dt = _between(self.times_s, at_s)
         h0, h1, dh = _between(self.heights_m, amsl_m if self.heights == "amsl" else agl_m)
         dt, dh = dt[:, None], dh[:, None]

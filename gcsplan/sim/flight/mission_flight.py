@@ -65,9 +65,8 @@ class FlownLanes:
     def energy_j(self, lane: int, vehicle: Vehicle) -> float:
         """Joules of a lane in the air that it flew through, up to where it came."""
         track, held_s = self.track_of(lane), float(self.hold_s[lane])
-        s = np.concatenate([[0.0], np.cumsum(track.length_m)])
         climbed_m = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(track.points[:, 2])))])
-        up_m = float(np.interp(self.along_m[-1, lane], s, climbed_m))
+        up_m = float(np.interp(self.along_m[-1, lane], track.node_m, climbed_m))
         wind_m_s = float(self.held_air_m[lane]) / held_s if held_s > 0.0 else 0.0
         moving_j = vehicle.energy.under_way_j(up_m, float(self.air_m[lane]), self.moved_s(lane))
         return moving_j + vehicle.energy.hold_w(wind_m_s) * held_s
@@ -89,7 +88,7 @@ class FlownLanes:
     def trace(self, lane: int, *, leaves: bool = False) -> Trace:
         """Return the trace of a lane, from leaving the ground to its end; it includes every node of the track."""
         track = self.track_of(lane)
-        s = np.concatenate([[0.0], np.cumsum(track.length_m)])
+        s = track.node_m
         end_s = self.end_s[lane] if np.isfinite(self.end_s[lane]) else self.times_s[-1]
         kept = (self.times_s > self.begin_s[lane]) & (self.times_s < end_s)
         stops = [(at, float(s[node])) for node, reached, left in self.stops[lane] for at in (reached, left)]
@@ -111,8 +110,7 @@ class FlownLanes:
 
     def _places(self, lane: int, times: Floats, along: Floats) -> Floats:
         track = self.track_of(lane)
-        s = np.concatenate([[0.0], np.cumsum(track.length_m)])
-        on_track = np.column_stack([np.interp(along, s, track.points[:, k]) for k in range(3)])
+        on_track = np.column_stack([np.interp(along, track.node_m, track.points[:, k]) for k in range(3)])
         if self.offset_m is None:
             return on_track
         off = self.offset_m[:, lane]
@@ -123,8 +121,7 @@ class _Ways:
     """The pieces of all tracks in one array each, and for each piece the next stop."""
 
     def __init__(self, tracks: Sequence[CommandedTrack]) -> None:
-        length = [t.length_m for t in tracks]
-        along = [np.concatenate([[0.0], np.cumsum(one)]) for one in length]
+        length, along = [t.length_m for t in tracks], [t.node_m for t in tracks]
         braking = [t.braking() for t in tracks]
         self.first: Indices = np.cumsum([0, *(len(one) for one in length[:-1])]).astype(np.intp)
         self.begin, self.end = np.concatenate([a[:-1] for a in along]), np.concatenate([a[1:] for a in along])
@@ -188,7 +185,8 @@ def fly(
     step, through_m = 0, np.zeros(len(lanes.s))
     while not lanes.done.all() and step * FLIGHT_STEP_S < latest_s:
         step += 1
-        lanes.advance(step * FLIGHT_STEP_S, None if weather.calm else air.wind)
+        with np.errstate(divide="ignore", invalid="ignore"):  # columns are not level, some speeds have no bound
+            lanes.advance(step * FLIGHT_STEP_S, None if weather.calm else air.wind)
         if step % SAMPLE_STEPS == 0:
             times.append(step * FLIGHT_STEP_S)
             along.append(lanes.s.copy())
@@ -230,7 +228,7 @@ class _Lanes:
         self.stops: list[list[tuple[int, float, float]]] = [[(0, 0.0, float(w))] for w in self.wait]
 
     def advance(self, to_s: float, wind: Floats | None) -> None:
-        """Advance every lane to the time ``to_s``."""
+        """Advance every lane to the time ``to_s``; numbers may be divided by 0."""
         ways = self._ways
         b = to_s - self.clock
         waited = np.minimum(self.wait, b)
@@ -247,11 +245,10 @@ class _Lanes:
         over_ground = self.command if wind is None else self._over_ground(k, wind)
         # The limits at the end of the step count, because a step may lead into a corner or out of one.
         there = self._piece_at(k, np.minimum(s + v * b, ways.before_stop[k]))
-        with np.errstate(divide="ignore"):
-            cap = np.minimum(ways.cap[there], over_ground / ways.level[there])
-            slow = v >= np.minimum(ways.cap[k], over_ground / ways.level[k])
-            # After a slow piece, acceleration begins at the end of that piece, not at the start of the step.
-            after = np.where(slow & (there != k), b - (ways.begin[there] - s) / np.maximum(v, CRAWL_M_S), b)
+        cap = np.minimum(ways.cap[there], over_ground / ways.level[there])
+        slow = v >= np.minimum(ways.cap[k], over_ground / ways.level[k])
+        # After a slow piece, acceleration begins at the end of that piece, not at the start of the step.
+        after = np.where(slow & (there != k), b - (ways.begin[there] - s) / np.maximum(v, CRAWL_M_S), b)
         half = 0.5 * accel * b
         ahead = half**2 + ways.square[there] + 2.0 * accel * (ways.end[there] - s) - 2.0 * half * v
         braked = np.where(accel < AT_ONCE_M_S2, np.sqrt(np.maximum(ahead, 0.0)) - half, np.inf)
@@ -298,9 +295,8 @@ class _Lanes:
         """
         ways, k = self._ways, self.piece
         timed = ways.timed[k] & (b > 0.0)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            held = over_ground / (ways.level[k] * ways.pace[k])
-            kept = self.command / command * ways.cap[k] / ways.pace[k]
+        held = over_ground / (ways.level[k] * ways.pace[k])
+        kept = self.command / command * ways.cap[k] / ways.pace[k]
         pace = np.where(timed, np.minimum(kept, held), 0.0)
         then = ways.clock[k] + (self.s - ways.begin[k]) / np.where(timed, ways.pace[k], 1.0) + b * pace
         return timed, np.where(timed, then, 0.0), pace
@@ -362,6 +358,5 @@ class _Lanes:
             in_air = np.where(self._keeps, np.minimum(self.command, most), most)
             through = np.sqrt(np.maximum(in_air**2 - aside, 0.0))
             headway = np.maximum(tail + through, HEADWAY_M_S)
-            with np.errstate(invalid="ignore"):  # an airspeed without a bound
-                most = np.where(np.isinf(level), level, level + (slope - level) * np.minimum(headway / most, 1.5))
+            most = np.where(np.isinf(level), level, level + (slope - level) * np.minimum(headway / most, 1.5))
         return np.asarray(np.where(self._keeps, headway, np.minimum(self.command, headway)))

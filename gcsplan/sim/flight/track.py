@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -37,7 +38,7 @@ PASSED = -1.0
 """Value in `CommandedTrack.hold_s` of a node that is passed without a stop."""
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@dataclass(frozen=True, eq=False)
 class CommandedTrack:
     """N nodes and the N - 1 straight pieces between them.
 
@@ -69,15 +70,19 @@ class CommandedTrack:
     not_flown: tuple[Note, ...]
     keeps_airspeed: bool = False
 
-    @property
+    @cached_property
     def length_m(self) -> Floats:
         """(N - 1,) length of each piece in space."""
         return np.asarray(np.linalg.norm(np.diff(self.points, axis=0), axis=1))
 
+    @cached_property
+    def node_m(self) -> Floats:
+        """(N,) metres along the track to each node."""
+        return np.concatenate([[0.0], np.cumsum(self.length_m)])
+
     def heights_m(self, along_m: Floats) -> tuple[Floats, Floats]:
         """The heights above sea and above ground at ``along_m`` (K,), metres along the track."""
-        node_m = np.concatenate([[0.0], np.cumsum(self.length_m)])
-        amsl_m = np.interp(along_m, node_m, self.points[:, 2])
+        amsl_m = np.interp(along_m, self.node_m, self.points[:, 2])
         return amsl_m, amsl_m - np.interp(along_m, *self.ground.T)
 
     def slack_m(self, times_s: Floats, along_m: Floats) -> Floats:
