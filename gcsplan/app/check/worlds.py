@@ -404,7 +404,7 @@ def _departing(mission: Mission, judging: Callable[[Mission], Verdict]) -> Verdi
     if tried is mission:
         note = Note("gates_since_departure", first.seq, leaves=_of_day(tried.leaves_s))
         return replace(verdict, notes=(*verdict.notes, note))
-    leaves_s = math.floor(opens_s - verdict.gates_after_s()[0])
+    leaves_s = round(opens_s - verdict.gates_after_s()[0])  # as a plan rounds when a gate opens
     note = Note("gate_departure_unknown", first.seq, opens=_of_day(opens_s), leaves=_of_day(leaves_s))
     verdict = judging(replace(mission, leaves_s=leaves_s))
     return replace(verdict, mission=mission, not_judged=(*verdict.not_judged, note))

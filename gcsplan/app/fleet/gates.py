@@ -36,7 +36,10 @@ MOST_SOUGHT = 8
 BESIDE_WAY_M = 100.0
 """Metres within which a vehicle passes a place, to have a gate beside it."""
 BETWEEN_GATES_M = 200.0
-"""Least distance of gates on a way from each other, and from its ends, m."""
+"""Least distance of gates on a way from each other, and from its begin, m."""
+BEFORE_GOAL_M = 50.0
+"""Least distance of a gate from the goal, m: only what is flown behind the last one makes the arrival uncertain, and a
+copter that a wind slows to 3 m/s flies 200 m in up to 30 s more."""
 GUESS_S = 600
 """Seconds between gates before it is known how long the flight to them takes."""
 
@@ -98,7 +101,8 @@ def gated(
     if not passes:
         able = [v for v in vehicles if waits_for_time(v.request.vehicle)]
         words = (
-            f"no vehicle passes within {BESIDE_WAY_M:g} m of a place, {BETWEEN_GATES_M:g} m from the ends of its way: "
+            f"no vehicle passes within {BESIDE_WAY_M:g} m of a place, {BETWEEN_GATES_M:g} m behind its start and "
+            f"{BEFORE_GOAL_M:g} m before its goal: "
             "give other places, or how many gates each has"
             if able
             else f"{vehicles[0].name} {no_time_of_day(vehicles[0].request.vehicle)}: leave gates out, and give a wider "
@@ -117,22 +121,22 @@ def _with(v: VehiclePlan, brief: Brief, at_m: tuple[float, ...], start: datetime
 
 def _places_m(v: VehiclePlan, gates: int | GatePlaces) -> tuple[float, ...]:
     """Metres over ground from the begin of the path to each gate: a number of them at equal distances, the last just
-    before the goal, for only what is flown behind it makes the arrival uncertain."""
+    before the goal."""
     points = v.solution.path.points[:, :2]
     way_m = track_length_m(points)
     if isinstance(gates, int):
-        most = max(math.floor(way_m / BETWEEN_GATES_M) - 1, 0)
+        most = max(math.floor((way_m - BEFORE_GOAL_M) / BETWEEN_GATES_M), 0)
         if gates > most:
             raise NoMission(
                 f"{v.name}: its way of {way_m:.0f} m has room for {most} gates {BETWEEN_GATES_M:g} m apart, "
                 f"not for {gates}",
                 reason="time",
             )
-        return tuple((way_m - BETWEEN_GATES_M) * (k + 1) / gates for k in range(gates))
+        return tuple((way_m - BEFORE_GOAL_M) * (k + 1) / gates for k in range(gates))
     away_m, along_m = nearest_on(np.array(gates), points)
     kept: list[float] = []
     for at in sorted(along_m[away_m <= BESIDE_WAY_M].tolist()):
-        if at - (kept[-1] if kept else 0.0) >= BETWEEN_GATES_M and way_m - at >= BETWEEN_GATES_M:
+        if at - (kept[-1] if kept else 0.0) >= BETWEEN_GATES_M and way_m - at >= BEFORE_GOAL_M:
             kept.append(at)
     return tuple(kept)
 
