@@ -76,7 +76,8 @@ def _part(planned: Plan, v: VehiclePlan) -> RehearsalPart:
 
 
 def terms_of(planned: Plan) -> Terms:
-    """The requirements of the mission file on the fleet: the order, if it is a sequence, and the separation."""
+    """The requirements of the mission file on the fleet: the order of a sequence, the times between arrivals, and the
+    separation."""
     arrival = planned.source.arrival
     if arrival is None or len(planned.vehicles) < 2:
         return Terms()
@@ -84,10 +85,11 @@ def terms_of(planned: Plan) -> Terms:
     pad_clear_s = math.inf if arrival.pad_clear_s is None else arrival.pad_clear_s
     intervals_s: tuple[float, ...] = ()
     window_s = arrival.window_s
-    if planned.fleet is not None and order and planned.fleet.intervals:
-        intervals_s = tuple(interval.requested_s for interval in planned.fleet.intervals)
+    if planned.fleet is not None and planned.fleet.intervals:
+        intervals_s = tuple(interval.requested_s for interval in planned.fleet.intervals) if order else ()
         window_s += 0.0 if planned.fleet.start_utc is None else WHOLE_S
-    return Terms(order, arrival.separation_m, pad_clear_s, window_s, intervals_s)
+    together = arrival.mode == "together"
+    return Terms(order, arrival.separation_m, pad_clear_s, window_s, intervals_s, together)
 
 
 def weather_of(

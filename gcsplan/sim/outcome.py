@@ -123,13 +123,19 @@ class Terms:
     distance is reported but not judged. ``pad_clear_s``: seconds for which a landed vehicle blocks its place.
     ``window_s``: how much an interval between two arrivals in this order may differ from the planned one.
     ``intervals_s``: the planned ones, between neighbours in this order; empty: as in the time table, which holds in
-    still air."""
+    still air. ``together``: any two arrive within ``window_s``."""
 
     order: tuple[str, ...] = ()
     separation_m: float | None = None
     pad_clear_s: float = math.inf
     window_s: float = 0.0
     intervals_s: tuple[float, ...] = ()
+    together: bool = False
+
+    @property
+    def timed(self) -> bool:
+        """Whether times between arrivals are requested."""
+        return self.together or len(self.order) > 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -225,7 +231,7 @@ class Performance:
 
         row = {"vehicle": self.name, "leaves": clock(self.depart_s + self.late_s), "planned": clock(self.planned_s)}
         if self.window_s is not None:
-            row["window"] = " – ".join(map(clock, self.window_s))
+            row["window"] = " – ".join(clock(at_s + self.shifted_s) for at_s in self.window_s)
         arrived = _median(self.arrive_s)
         row["arrives"] = clock(math.inf if arrived is None or math.isnan(arrived) else arrived)
         error = _median(self.errors_s)
@@ -248,8 +254,9 @@ class Rehearsal:
     ``closest``: the nearest approach of any two vehicles in any run, None if no two flew at the same time.
     ``intervals_kept_runs``: in how many runs all intervals between arrivals in the planned order were as planned, up to
     the terms' ``window_s`` and `MODEL_S`; ``interval_error_s``: how much longer (shorter: negative) than planned the
-    worst was, None without an order. ``simulator``: ``gcsplan`` or ``sitl``. ``weather``: the simulated weather, for
-    output. ``flown``: the flown paths of the first run, in the order of ``vehicles``.
+    worst was, None if none is requested; together: between the first and the last. ``simulator``: ``gcsplan`` or
+    ``sitl``. ``weather``: the simulated weather, for output. ``flown``: the flown paths of the first run, in the order
+    of ``vehicles``.
     """
 
     simulator: str
@@ -314,7 +321,7 @@ class Rehearsal:
             "fleet": {
                 "order": list(self.terms.order), "order_flown": list(self.order_flown),
                 "order_kept_runs": self.order_kept_runs if self.terms.order else None,
-                "intervals_kept_runs": self.intervals_kept_runs if self.terms.order else None,
+                "intervals_kept_runs": self.intervals_kept_runs if self.terms.timed else None,
                 "worst_interval_error_s": _number(self.interval_error_s),
                 "separation_m": self.terms.separation_m,
                 "min_separation_m": None if self.closest is None else _number(self.closest.distance_m),
@@ -480,12 +487,18 @@ class Tally:
         self.breach("order", (), Note("order_lost", came=tuple(came), planned=tuple(planned)), 1.0)
 
     def _intervals(self, traces: Sequence[Trace]) -> None:
-        """Compare the times between the arrivals in the planned order with the planned ones."""
+        """Compare the times between the arrivals in the planned order with the planned ones; together: of any two."""
         came_s = {t.name: t.arrive_s for t in traces}
         table_s = {p.vehicle.name: p.arrive_s or 0.0 for p in self.parts}
         pairs = list(pairwise(self.terms.order))
         planned_s = self.terms.intervals_s or [table_s[after] - table_s[before] for before, after in pairs]
         off_s = [came_s[after] - came_s[before] - s for (before, after), s in zip(pairs, planned_s, strict=True)]
+        if self.terms.together:
+            off_s = (
+                [max(came_s.values()) - min(came_s.values())]
+                if all(map(math.isfinite, came_s.values()))
+                else [math.inf]
+            )
         off_s = [off if math.isfinite(off) else math.inf for off in off_s]
         if off_s:
             worst_s = max(off_s, key=abs)
@@ -523,5 +536,5 @@ class Tally:
         return Rehearsal(
             simulator, self.runs, seed, weather, tuple(performances), self.terms, self.order_flown, self.order_kept,
             self.separation_kept, self.closest, tuple(breaches), tuple(dict.fromkeys(self.notes)), self.flown,
-            self.intervals_kept, self.interval_error_s if len(self.terms.order) > 1 else None,
+            self.intervals_kept, self.interval_error_s if self.terms.timed else None,
         )  # fmt: skip

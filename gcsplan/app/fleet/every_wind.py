@@ -156,8 +156,9 @@ def require_intervals(
     if not bad:
         return
     worst = max(bad, key=lambda one: one.off_s)
-    least_s = max(one.width_s for one in found)
-    apart = f"{floored(worst.least_s, 1):.1f} to {raised(worst.most_s, 1):.1f} s"
+    widest_s = max(one.width_s for one in found)
+    least_s, most_s = floored(worst.least_s, 1), raised(worst.most_s, 1)
+    apart = f"{least_s:.1f} to {most_s:.1f} s" if least_s >= 0.0 else f"{-least_s:.1f} s before to {most_s:.1f} s"
     request = f"{abs(round(worst.requested_s, 1)):g} s" + (
         f" ± {window_s:g} s (window_s)" if window_s else " (window_s: 0)"
     )
@@ -166,7 +167,7 @@ def require_intervals(
     if late_s:
         when += f"{', ' if when else ''}with departures up to {late_s:g} s late (depart_window_s),"
     raise NotInEveryWind(
-        f"{when} {worst.second} arrives {apart} after {worst.first}, requested are {request}", least_s,
+        f"{when} {worst.second} arrives {apart} after {worst.first}, requested are {request}", widest_s,
         frozenset(max(one.first, one.second, key=lambda name: drifts_of[name].most_s) for one in bad),
     )  # fmt: skip
 
@@ -200,17 +201,27 @@ def with_cures(why: NoMission, vehicles: Sequence[VehiclePlan], brief: Brief, ag
     curable = isinstance(why, NotInEveryWind) or (why.reason == "separation" and not goals_too_near(why))
     if len(vehicles) > MOST_TRIED or not curable:
         return why
+    near: list[NoMission] = []
+
+    def tried(some: Sequence[VehiclePlan], terms: Brief) -> object:
+        try:
+            return again(some, terms)
+        except NoMission as refusal:
+            near.extend([refusal] if goals_too_near(refusal) else [])
+            raise
+
     found = [
-        *_windows(why, vehicles, brief, again),
-        *_gates(vehicles, brief, again),
-        *_speeds(vehicles, brief, again),
-        *_winds(vehicles, brief, again),
-        *_departures(vehicles, brief, again),
+        *_windows(why, vehicles, brief, tried),
+        *_gates(vehicles, brief, tried),
+        *_speeds(vehicles, brief, tried),
+        *_winds(vehicles, brief, tried),
+        *_departures(vehicles, brief, tried),
     ]
     what = (
         f"what works: {', or '.join(found)}"
         if found
         else "no window, interval, gate, speed, departure or weaker wind that was tried helps"
+        + (f", for {near[0]}" if near else "")
     )
     return NoMission(f"{why}; {what}", reason="time" if isinstance(why, NotInEveryWind) else "separation")
 

@@ -201,8 +201,11 @@ def _ending(result: Rehearsal, units: Units) -> list[str]:
         lines.append(f"order of arrival {', '.join(result.terms.order)}: kept{kept}")
     if result.interval_error_s is not None:
         off_s, runs = result.interval_error_s, f" in {result.intervals_kept_runs} of {result.runs} runs"
-        allowed = f"intervals between arrivals within {result.terms.window_s + MODEL_S:g} s of the plan"
+        within = f"within {result.terms.window_s + MODEL_S:g} s of"
+        allowed = f"intervals between arrivals {within} the plan"
         off = f"the worst is {abs(off_s):.1f} s too {'long' if off_s > 0.0 else 'short'}"
+        if result.terms.together:
+            allowed, off = f"arrivals {within} each other", f"at most {off_s:.1f} s apart"
         kept = f"kept{runs if result.runs > 1 else ''}" if result.intervals_kept_runs else "not kept"
         lines.append(f"{allowed}: {kept}; {off if math.isfinite(off_s) else 'one never arrived'}")
     if result.closest is not None:
@@ -217,7 +220,10 @@ def _ending(result: Rehearsal, units: Units) -> list[str]:
         lines.append(f"95 % of all arrivals lie within {result.p95_s:.2f} s of the plan")
     if result.inside_windows is not None:
         inside, arrivals = result.inside_windows
-        lines.append(f"{inside} of {arrivals} {'arrivals lie' if arrivals > 1 else 'arrival lies'} inside the window")
+        late = ", that of a late departure so much later" if any(v.shifted_s for v in result.vehicles) else ""
+        lines.append(
+            f"{inside} of {arrivals} {'arrivals lie' if arrivals > 1 else 'arrival lies'} inside the window{late}"
+        )
     lines += [f"violation: {in_units(b.note(result.runs), units)}" for b in result.breaches]
     lines += [f"not flown: {in_units(what, units)}" for what in result.not_judged]
     lines.append(

@@ -406,7 +406,9 @@ def _takeoff(route: Route, vehicle: Vehicle) -> Motion | None:
         # The mission sets its speed after the climb-out, which is flown at the vehicle's own.
         way = legs(route.climb_out, vehicle, owner)
         return None if way is None else at_own_speed(way, vehicle.speed_max_m_s)
-    return None if ground is None else next(iter(upright(top[:2], ground, float(top[2]), vehicle, 0, ground)), None)
+    climb = [] if ground is None else upright(top[:2], ground, float(top[2]), vehicle, 0, ground)
+    # So is a climb that no rate bounds.
+    return at_own_speed(climb[0], vehicle.speed_max_m_s) if climb else None
 
 
 def _after(route: Route, vehicle: Vehicle) -> list[Motion]:

@@ -124,6 +124,29 @@ def test_a_rehearsal_judges_intervals_by_the_request_where_one_of_two_drifts() -
 
 
 @pytest.mark.slow
+def test_a_climb_that_no_rate_bounds_takes_the_same_time_in_table_check_and_rehearsal() -> None:
+    mission = fan("cc", {}, {"mode": "sequence", "interval_s": 30})
+    done = plan({key: value for key, value in mission.items() if key != "wind"})
+    assert done.fleet is not None
+    assert done.vehicles[1].speed_m_s < 9.0  # below its fastest, at which it climbs
+    took_s = [slot.arrive_s - slot.depart_s for slot in done.fleet.slots]
+    assert took_s == pytest.approx([v.verdict.arrive_s for v in done.vehicles], abs=1e-3)
+    assert [v.errors_s[0] for v in rehearse(done).vehicles] == pytest.approx([0.0, 0.0], abs=1e-3)
+
+
+@pytest.mark.slow
+def test_a_rehearsal_says_whether_a_fleet_arrives_together_and_shows_the_window_of_a_late_departure() -> None:
+    done = plan(fan("cc", {"up_to_m_s": 3}, {"mode": "together", "window_s": 5}))
+    weather = weather_of(done.source, None, None, 0.0, 0.0)
+    on_time, late = (rehearse(done, weather=weather, runs=2, late_s=late_s) for late_s in ({}, {"c1": 40.0}))
+    assert (on_time.intervals_kept_runs, late.intervals_kept_runs) == (2, 0)
+    assert late.interval_error_s == pytest.approx(40.0, abs=2.0)
+    assert (on_time.safe, late.safe, late.inside_windows) == (True, True, (4, 4))
+    shown = [[v.row(1)["window"] for v in one.vehicles] for one in (on_time, late)]
+    assert [a == b for a, b in zip(*shown, strict=True)] == [False, True]
+
+
+@pytest.mark.slow
 def test_copters_give_up_speed_to_keep_their_times_in_each_wind() -> None:
     done = plan(fan("cc", {"up_to_m_s": 5}, {"mode": "sequence", "interval_s": 20}))
     assert_held(done, Winds([[(0.0, 5.0)]], [[(0.0, 360.0)]]), some_shares(2, 2), 0.0, 20.0)
@@ -184,3 +207,13 @@ def test_goals_on_one_pad_are_refused_without_a_search_for_cures() -> None:
         plan(mission)
     assert "what works" not in str(refused.value)
     assert "tried" not in str(refused.value)
+
+
+@pytest.mark.slow
+def test_where_nothing_helps_because_goals_are_too_near_a_refusal_says_so() -> None:
+    mission = fan("cc", {"up_to_m_s": 5, "gust_m_s": 7}, {"mode": "sequence", "interval_s": 30})
+    for vehicle in mission["vehicles"]:
+        vehicle |= {"goal": {"east_m": 0.0, "north_m": 900.0}, "end": "land"}
+    words = r"arrives \d+\.\d s before to .* after .* that was tried helps, for the goals of c1 and c2 .* put the goals"
+    with pytest.raises(NoMission, match=words):
+        plan(mission)
