@@ -23,8 +23,8 @@ from gcsplan.bench.terrain.problems import NamedProblem, key_of, problems
 from gcsplan.errors import InputError
 from gcsplan.planners.problem import Problem
 
-RIVAL_KINDS = ("main", "band", "everyday", "time")
-"""The kinds that rivals can solve: length, or time, without a turn radius."""
+RIVAL_KINDS = ("main", "band", "everyday", "ceiling", "time")
+"""The kinds with problems that rivals can solve."""
 
 RIVAL_START_S = 180.0  # seconds to import, make the problems and compile
 
@@ -44,14 +44,24 @@ class Rival:
 
     @property
     def limit_s(self) -> float:
-        """Wall-clock seconds after which it counts as hanging; generous, since the processor may be shared."""
-        return 120.0 + (40.0 * self.seconds if self.family == "ompl" else 1200.0)
+        """Wall-clock seconds after which it counts as hanging; generous, since the processor may be shared, and OMPL
+        may take ten times its seconds of it (`ompl.LEAST_OWN`)."""
+        return 120.0 + (200.0 * self.seconds if self.family == "ompl" else 1200.0)
 
 
 def rivals(seconds: Sequence[float], *, ompl: bool = True, swarms: bool = True) -> list[Rival]:
     """All rivals: OMPL's planners at each of ``seconds``, and mealpy's swarms."""
     out = [Rival("ompl", p, s) for s in sorted(seconds) for p in terrain_ompl.PLANNERS] if ompl else []
     return out + [Rival("mealpy", p) for p in terrain_swarms.SWARMS] if swarms else out
+
+
+def solvable(named: Sequence[NamedProblem]) -> list[NamedProblem]:
+    """Those that rivals can solve: the shortest or the fastest path, without a turn radius."""
+    return [
+        one
+        for one in named
+        if one.kind in RIVAL_KINDS and one.problem.objective != "energy" and one.problem.turn_radius_m == 0.0
+    ]
 
 
 def release(rival: Rival) -> str:

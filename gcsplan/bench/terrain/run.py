@@ -128,8 +128,7 @@ def run(  # noqa: PLR0913 - options by name, each with a default
                 if long:
                     tell(f"{OUR_LONG_METHOD}: {one.name}")
                     result.outcomes.append(measure(one, sweep, planner=planner, long=True))
-            if kind in others.RIVAL_KINDS:
-                compared += named
+            compared += others.solvable(named)
             write()
         if compared_with:
             kept = others.Answers(directory / ANSWERS)

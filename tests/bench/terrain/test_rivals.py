@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import pytest
@@ -48,3 +48,15 @@ def test_what_is_kept_is_not_run_again_and_is_judged_again(
     more = [good, terrain_rivals.Rival("ompl", "BIT*", 3.0)]
     kept = terrain_rivals.compare([one], more, answers, seed=1, kept_only=True)
     assert [o.method for o in kept] == [good.method]
+
+
+def test_rivals_are_asked_for_shortest_and_fastest_paths_without_a_turn_radius(main: list[NamedProblem]) -> None:
+    one = easy(main)
+    named = [
+        replace(one, kind=kind, problem=replace(one.problem, objective=objective, turn_radius_m=radius_m))
+        for kind in ("main", "ceiling", "time", "turn")
+        for objective in ("length", "energy", "time")
+        for radius_m in (0.0, 80.0)
+    ]
+    asked = [(p.kind, p.problem.objective, p.problem.turn_radius_m) for p in terrain_rivals.solvable(named)]
+    assert asked == [(kind, goal, 0.0) for kind in ("main", "ceiling", "time") for goal in ("length", "time")]
