@@ -92,15 +92,17 @@ def lay_sections(
 
 
 @device
-def _lay_leg(legs: Floats, at: int, flat: float, slope_count: int, slant: Floats, beyond: Floats, spec: Floats) -> None:
+def lay_leg(legs: Floats, at: int, flat: float, slope_count: int, slant: Floats, loss: Floats, spec: Floats) -> None:
     """Set row ``at`` of ``legs``: the planes of a leg between sections ``flat`` metres apart that gets aside by so many
     steps, and the cost of its level metres."""
     step = spec[STEP]
     off = at * step
     run = math.sqrt(flat * flat + off * off)
-    turn = step * (off + step) / math.sqrt(flat * flat + (off + step) * (off + step))
+    longer = step * (off + step) / math.sqrt(flat * flat + (off + step) * (off + step))
+    shorter = step * off / run
     for q in range(slope_count):
-        legs[at, q] = slant[q] * run - beyond[q] * turn
+        up, down = loss[1, q] * shorter - loss[2, q] * run, loss[3, q] * shorter - loss[4, q] * run
+        legs[at, q] = slant[q] * run - max(loss[0, q] * longer, up, down)
     legs[at, slope_count] = spec[LEVEL] * run
 
 
@@ -140,19 +142,19 @@ def _raise_rest(value: Floats, near: Floats, slope: Floats, low: float, high: fl
                 at, of = ends[side, q], ends[2 + side, q]
 
 
-@kernel("i8[] f8[] i8[] f8[] f8[] f8[] f8[] f8[] f8[] f8[] f8[] f8[,] f8[,] f8[,] f8[,]")
+@kernel("i8[] f8[] i8[] f8[] f8[] f8[] f8[] f8[] f8[,] f8[] f8[] f8[,] f8[,] f8[,] f8[,]")
 def cheapest_chains(
     first: Int64s, gap: Floats, place: Int64s, low: Floats, high: Floats, left: Floats, slope: Floats, slant: Floats,
-    beyond: Floats, spec: Floats, least: Floats, value: Floats, near: Floats, legs: Floats, ends: Floats,
+    loss: Floats, spec: Floats, least: Floats, value: Floats, near: Floats, legs: Floats, ends: Floats,
 ) -> int:  # fmt: skip
     """Lower bounds of the cost of chains from the first node to each node, at every altitude; returns the legs counted.
 
     At node n and altitude z, a chain costs at least ``value[n, q] + slope[q] * z``, for each q; ``near[n, q]`` is the
     node before it of the chain that decides. A leg costs no less than each plane (docs/planner.md, "Sections"):
-    ``slant[q]`` for a metre of track, ``slope[q]``, rising from q to q, for a metre of climb, less ``beyond[q]`` for
-    each metre of track that rounding may take. Sections k and k + 1 are ``gap[k]`` apart, node n is ``place[n]`` steps
-    aside, and the goal is ``left[n]`` metres away. The caller sets ``value`` at the first node. To work in: ``least``
-    (N,), ``ends`` (4, Q), and ``legs`` (D, Q + 1) for all that may get aside between two sections, in steps.
+    ``slant[q]`` for a metre of track, ``slope[q]``, rising from q to q, for a metre of climb, less what rounding may
+    make it dearer (``loss`` (5, Q): `Planes`). Sections k and k + 1 are ``gap[k]`` apart, node n is ``place[n]`` steps
+    aside, and ``left[n]`` is the least cost from it on. The caller sets ``value`` at the first node. To work in:
+    ``least`` (N,), ``ends`` (4, Q), and ``legs`` (D, Q + 1) for all that may get aside between two sections, in steps.
     """
     pairs = 0
     least[0] = fewest = 0.0
@@ -163,7 +165,7 @@ def cheapest_chains(
         for n in range(of1, first[k + 2]):
             value[n, :], near[n, :] = NONE, -1.0
             ends[:2, :] = NONE
-            most = spec[MOST] - spec[LEVEL] * left[n]
+            most = spec[MOST] - left[n]
             while nearest + 1 < of1 and abs(place[nearest + 1] - place[n]) <= abs(place[nearest] - place[n]):
                 nearest += 1
             for side in range(2):
@@ -171,7 +173,7 @@ def cheapest_chains(
                 while of0 <= m < of1:
                     off = abs(place[m] - place[n])
                     while laid <= off:
-                        _lay_leg(legs, laid, gap[k], len(slope), slant, beyond, spec)
+                        lay_leg(legs, laid, gap[k], len(slope), slant, loss, spec)
                         laid += 1
                     level = legs[off, len(slope)]
                     if fewest + level > most:

@@ -29,12 +29,10 @@ from gcsplan.planners.problem import Problem
 
 SPACING_M, LEAST_SECTIONS = 240.0, 8
 """Metres between the first sections, but at least so many of them on the straight way."""
-LOOKS = ((1e6, 0), (4e6, 0), (6e6, 1), (1.2e7, 2))
+LOOKS = ((1.5e6, 0), (1.2e7, 1), (4e7, 2))
 """Legs between nodes that are looked at, at most, and how often the spacing was halved."""
-LOOK_SHARES = (0.8, 0.15, 0.25, 0.15)
+LOOK_SHARES = (0.8, 0.3, 0.15)
 """The part of the gap that each of them closes, on average."""
-NEAR_NODES = 1.0 / 12.0
-"""Metres between nodes, as a part of the spacing, up to which a look with more nodes on the same lines is left out."""
 WORTH_MORE = 0.03
 """Part of the gap that a look must close for the next one to follow."""
 NEARER_PATH = 0.7
@@ -49,45 +47,60 @@ LEVEL_SLOPES, STEEPEST = (0.03, 0.07, 0.12, 0.18, 0.26, 0.36, 0.5), 1.0
 """Prices of a metre of climb in metres of track, and the slope from which on a climb limit does not count."""
 BEYOND = (0.1, 0.4, 1.0)
 """Prices of a metre of climb beyond the limit: parts of the way from its price to the price of laps."""
+LATER, EARLIER = 1.0 / 9.0, 4.0 / 9.0
+"""Of what rounding may take from a leg at its climb limit: the parts for planes up to the limit, of the longer of two
+legs, and for planes beyond it, of the shorter one. The square roots of both add up to one."""
+LAID_OUT = 35.0
+"""Most nodes of a look, for the square root of its legs."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Planes:
     """The planes (Q,) below the cost of a leg: ``slope`` for each metre that it rises, in rising order, and ``slant``
-    for each metre of its track; ``beyond``: what a plane beyond the climb limit loses for each metre of track that
-    rounding may take. ``level``: the cost of a level metre."""
+    for each metre of its track. ``level``: the cost of a level metre. ``loss`` (5, Q): what rounding may take from
+    each, as docs/planner.md, "Sections", has it: for a metre of the turn with the next longer leg; and for climbs,
+    then for descents, for a metre of that with the next shorter one, less for a metre of track."""
 
     slope: Floats
     slant: Floats
-    beyond: Floats
+    loss: Floats
     level: float
 
     @classmethod
     def of(cls, problem: Problem) -> Planes:
         """The planes of a problem's objective and climb limits."""
         limits = problem.bound_limits
-        up, down = (_side(problem, k) for k in (limits.max_climb_slope, limits.max_descent_slope))
+        up, down = sides = [_side(problem, k) for k in (limits.max_climb_slope, limits.max_descent_slope)]
         slope, slant, beyond = (
-            np.concatenate([b[:0:-1] * sign, a]) for a, b, sign in zip(up, down, (-1, 1, 1), strict=True)
+            np.concatenate([b[:0:-1], a]) for a, b in zip(up[:3], (-down[0], *down[1:3]), strict=True)
         )
-        return cls(slope, slant, beyond, float(slant.max()))
+        # Where climbs have a price of their own, planes up to the limit are dearer for every climb.
+        loss = np.zeros((5, len(slope)))
+        loss[0] = beyond * (EARLIER if problem.rates is None else 1.0)
+        for row, (_, _, over, (k, limit, flat)), price in zip((1, 3), sides, (slope, -slope), strict=True):
+            if over.any() and problem.rates is None:
+                loss[row] = LATER * flat + np.maximum(limit - price, 0.0) * k
+                loss[row + 1] = np.maximum(flat + limit * k - slant - price * k, 0.0)
+        return cls(slope, slant, loss, float(slant.max()))
 
 
-def _side(problem: Problem, limit: float) -> tuple[Floats, Floats, Floats]:
-    """The planes of one climb limit (a slope), from level flight on."""
+def _side(problem: Problem, limit: float) -> tuple[Floats, Floats, Floats, tuple[float, float, float]]:
+    """The planes of one climb limit (a slope), from level flight on, and what each beyond it costs less for each metre
+    of track that is missing for the climb. At the limit: its slope, and what a metre of climb and of track cost."""
     # The slope is raised by the rounding of its angle, so that a path exactly at the limit counts.
     k = min(limit, STEEPEST) + 2e-8
     beyond = np.array(BEYOND if limit < STEEPEST else ())
     if problem.rates is not None:
         level, climb = problem.rates
         slope = np.concatenate([[0.0, 0.5 * climb, climb], climb + beyond * level / k])
-        over = np.maximum(slope - climb, 0.0)
-        return slope, level - k * over, k * over
+        over = k * np.maximum(slope - climb, 0.0)
+        return slope, level - over, over, (k, climb, level)
     flat, sine = 1.0 / math.hypot(1.0, k), k / math.hypot(1.0, k)
     legal = [0.0, *(price for price in LEVEL_SLOPES if price < 0.9 * sine), sine]
     slope = np.concatenate([legal, sine + beyond * (1.0 / sine - sine)])
-    over = np.maximum(slope - sine, 0.0)
-    return slope, np.where(over > 0.0, flat - k * over, np.sqrt(1.0 - np.minimum(slope, sine) ** 2)), k * over
+    over = k * np.maximum(slope - sine, 0.0)
+    slant = np.where(over > 0.0, flat - over, np.sqrt(1.0 - np.minimum(slope, sine) ** 2))
+    return slope, slant, over, (k, sine, flat)
 
 
 class SectionChains(Search):
@@ -125,7 +138,7 @@ class SectionChains(Search):
     def size(self) -> Size:
         """The legs between nodes of the next look."""
         pairs = LOOKS[self._next][0]
-        return pairs * LEG_S, self.work.plane.size(1.0)[1] + pairs / 100.0 * NODE_MB
+        return pairs * LEG_S, self.work.plane.size(1.0)[1] + LAID_OUT * math.sqrt(pairs) * NODE_MB
 
     def run(self) -> None:
         """Raise the bound, and try the cheapest chain as a track; and after later looks, if path and bound are far
@@ -150,9 +163,6 @@ class SectionChains(Search):
         halved = before is not None and len(sections.lines) > len(before.sections.lines)
         little = gap - (incumbent.cost - incumbent.bound) < WORTH_MORE * gap
         after = self._next + 1
-        near = sections.step_m <= NEAR_NODES * float(sections.gap.max())
-        if near and after < len(LOOKS) and LOOKS[after][1] == halvings:
-            after += 1
         self._goes_on = after < len(LOOKS) and chain is not None and not (halved and little)
         self._next, self._left = min(after, len(LOOKS) - 1), incumbent.gap
         if chain is not None and (halvings > 0 or not self._goes_on) and incumbent.gap > BAND_FAR:
@@ -203,28 +213,30 @@ class _Look:
         # What rounding adds to the track, in expectation.
         self.less = planes.level * sections.step_m**2 / 8.0 * float((1.0 / sections.gap).sum())
         self.most = cost + self.less
-        self.value, self.near, self.pairs = self._swept(back=False)
+        self.value, self.near, self.pairs = self._swept()
         low, high = sections.low[-1], sections.high[-1]
         ends = self.value[-1] + np.minimum(planes.slope * low, planes.slope * high)
         self.bound = float(ends.max()) - self.less if self.value[-1, 0] < NONE else math.inf
 
-    def _swept(self, *, back: bool) -> tuple[Floats, Floats, int]:
-        """`cheapest_chains` to each node, or from it to the last one: values, nodes before, and legs."""
+    def _swept(self, back: Floats | None = None) -> tuple[Floats, Floats, int]:
+        """`cheapest_chains` to each node: values, nodes before, and legs. Or from it to the last one, where ``back``
+        (N,) is the least cost to it: chains that cost too much with that are left out."""
         s, planes = self.sections, self.planes
-        turn = slice(None, None, -1 if back else 1)
-        first = (len(s.x) - s.first[turn]) if back else s.first
+        turn = slice(None, None, 1 if back is None else -1)
+        first = s.first if back is None else (len(s.x) - s.first[turn])
         place = np.rint(s.aside[turn] / s.step_m).astype(np.int64)
-        slope = -planes.slope if back else planes.slope
-        low, high, left, gap, slope, slant, beyond = (
-            np.ascontiguousarray(v[turn])
-            for v in (s.low, s.high, s.away if back else s.left, s.gap, slope, planes.slant, planes.beyond)
+        slope = planes.slope if back is None else -planes.slope
+        left = planes.level * s.left if back is None else np.maximum(planes.level * s.away, back)
+        low, high, left, gap, slope, slant = (
+            np.ascontiguousarray(v[turn]) for v in (s.low, s.high, left, s.gap, slope, planes.slant)
         )
+        loss = np.ascontiguousarray(planes.loss[:, turn])
         value, near = np.full((len(place), len(slope)), NONE), np.full((len(place), len(slope)), -1.0)
         value[0] = -slope * low[0]
         spec = np.array([s.step_m, planes.level, self.most])
         work = np.empty((int(np.ptp(place)) + 1, len(slope) + 1)), np.empty((4, len(slope)))
         pairs = cheapest_chains(
-            np.ascontiguousarray(first), gap, place, low, high, left, slope, slant, beyond, spec, np.empty(len(place)),
+            np.ascontiguousarray(first), gap, place, low, high, left, slope, slant, loss, spec, np.empty(len(place)),
             value, near, *work,
         )  # fmt: skip
         return value[turn, turn], near, pairs
@@ -245,7 +257,8 @@ class _Look:
     def nodes_left(self, cost: float) -> Bools:
         """(N,) the nodes that a rounded chain of a path cheaper than ``cost`` may pass."""
         s, slope = self.sections, self.planes.slope
-        back = self._swept(back=True)[0]
+        ends = np.minimum(slope * s.low[:, None], slope * s.high[:, None])
+        back = self._swept((self.value + ends).max(axis=1))[0]
         through = (self.value + back).max(axis=1)
         every = np.arange(len(s.x))
         for at, rising in ((s.low[:, None], 1.0), (s.high[:, None], -1.0)):

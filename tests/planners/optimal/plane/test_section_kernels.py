@@ -91,10 +91,12 @@ def chains(seed: int, *, beyond: float) -> tuple[float, float, bool]:
     half = np.append(np.linspace(0.0, sine, 4), sine + over[4:])
     flat = np.where(over > 0.0, math.sqrt(1.0 - sine**2) - k * over, np.sqrt(1.0 - np.minimum(half, sine) ** 2))
     slope, slant, more = (np.append(-v[:0:-1] if v is half else v[:0:-1], v) for v in (half, flat, beyond * k * over))
+    loss = np.zeros((5, len(slope)))
+    loss[0] = more
     value, near = np.full((n, len(slope)), NONE), np.full((n, len(slope)), -1.0)
     value[0] = -slope * low[0]
     spec, work = np.array([step, 1.0, most]), (np.empty((61, len(slope) + 1)), np.empty((4, len(slope))))
-    cheapest_chains(first, gap, place, low, high, left, slope, slant, more, spec, np.empty(n), value, near, *work)
+    cheapest_chains(first, gap, place, low, high, left, slope, slant, loss, spec, np.empty(n), value, near, *work)
     bound = float((value[-1] + slope * low[-1]).max())
 
     altitudes = np.arange(0.0, 51.0, 0.5)

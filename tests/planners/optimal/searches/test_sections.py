@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from gcsplan.planners.optimal.loop.workspace import Workspace
 from gcsplan.planners.optimal.plane.incumbent import Incumbent
+from gcsplan.planners.optimal.plane.section_kernels import lay_leg
 from gcsplan.planners.optimal.plane.sections import lay_out, lines_of, widest_spans
 from gcsplan.planners.optimal.searches.bound import Bound
 from gcsplan.planners.optimal.searches.sections import Planes, SectionChains
@@ -178,21 +179,23 @@ def test_no_leg_is_cheaper_than_a_plane(
 
 
 @given(
-    st.sampled_from(["length", "energy"]), st.floats(5.0, 44.0), st.floats(-1.2, 1.2), st.floats(-150.0, 150.0),
-    st.floats(0.2, 12.0), st.floats(60.0, 240.0),
+    st.sampled_from(["length", "energy"]), st.floats(5.0, 44.0), st.floats(5.0, 90.0), st.floats(0.0, 1.0),
+    st.floats(0.0, 1.2), st.sampled_from([-1.0, 1.0]), st.integers(0, 30), st.floats(0.2, 12.0), st.floats(30.0, 240.0),
 )  # fmt: skip
 def test_a_rounded_leg_costs_in_expectation_no_more_than_leg_and_rebate(
-    objective: Objective, climb_deg: float, slope: float, aside: float, step: float, gap: float
-) -> None:
-    problem = limited(objective, climb_deg, climb_deg)
+    objective: Objective, climb_deg: float, other_deg: float, kink: float, slope: float, sign: float, steps: int,
+    step: float, gap: float,
+) -> None:  # fmt: skip
+    problem = limited(objective, *((climb_deg, other_deg) if sign > 0.0 else (other_deg, climb_deg)))
     planes = Planes.of(problem)
-    run, rise = math.hypot(gap, aside), slope * math.hypot(gap, aside)
-    for part in np.linspace(0.0, 1.0, 9):  # the rounded difference is a step more with this probability
-        expected = 0.0
-        for off, chance in ((-part * step, 1.0 - part), ((1.0 - part) * step, part)):
-            rounded = abs(aside + off)
-            turn = step * (rounded + step) / math.hypot(gap, rounded + step)
-            values = planes.slant * math.hypot(gap, rounded) + planes.slope * rise - planes.beyond * turn
-            expected += chance * float(values.max())
-        less = planes.level * step**2 / (8.0 * gap)
-        assert expected <= cost_of(problem, run, rise) * (1.0 + 1e-6) + less
+    runs = np.hypot(gap, step * (steps + np.arange(2)))
+    # At the limit on a leg between the two that it is rounded to, and on any slope.
+    at_limit = math.tan(math.radians(climb_deg)) * math.hypot(gap, step * (steps + kink))
+    legs, most = np.empty((steps + 2, len(planes.slope) + 1)), np.array([step, planes.level, math.inf])
+    for at in range(steps + 2):
+        lay_leg(legs, at, gap, len(planes.slope), planes.slant, planes.loss, most)
+    for rise in (sign * at_limit, sign * slope * runs[0]):
+        rounded = (legs[steps:, :-1] + planes.slope * rise).max(axis=1)
+        for part in np.linspace(0.0, 1.0, 9):  # the rounded difference is a step more with this probability
+            cost = cost_of(problem, math.hypot(gap, step * (steps + part)), rise)
+            assert rounded @ (1.0 - part, part) <= cost * (1.0 + 1e-6) + planes.level * step**2 / (8.0 * gap)
