@@ -52,7 +52,7 @@ def kinds(planner: Planner, family: str, seed: int, most: int) -> set[str]:
 @pytest.mark.slow
 def test_a_bound_that_is_raised_by_a_ten_thousandth_is_found() -> None:
     """The planted bound lies just below the plan's own cost: only a witness shows that it is wrong."""
-    assert kinds(raised(lambda v: v.cost * (1.0 - 1e-6)), "walls", 2, 60) == {"undercut"}
+    assert kinds(raised(lambda v: v.cost * (1.0 - 1e-6)), "walls", 12, 60) == {"undercut"}
 
 
 def test_a_bound_above_the_plans_own_cost_is_found() -> None:

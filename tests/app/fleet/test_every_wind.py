@@ -124,7 +124,7 @@ def test_a_rehearsal_judges_intervals_by_the_request_where_one_of_two_drifts() -
 
 
 @pytest.mark.slow
-def test_a_climb_that_no_rate_bounds_takes_the_same_time_in_table_check_and_rehearsal() -> None:
+def test_a_climb_without_a_rate_takes_the_same_time_everywhere() -> None:
     mission = fan("cc", {}, {"mode": "sequence", "interval_s": 30})
     done = plan({key: value for key, value in mission.items() if key != "wind"})
     assert done.fleet is not None
@@ -135,7 +135,7 @@ def test_a_climb_that_no_rate_bounds_takes_the_same_time_in_table_check_and_rehe
 
 
 @pytest.mark.slow
-def test_a_rehearsal_says_whether_a_fleet_arrives_together_and_shows_the_window_of_a_late_departure() -> None:
+def test_a_rehearsal_judges_arrivals_together_and_late_windows() -> None:
     done = plan(fan("cc", {"up_to_m_s": 3}, {"mode": "together", "window_s": 5}))
     weather = weather_of(done.source, None, None, 0.0, 0.0)
     on_time, late = (rehearse(done, weather=weather, runs=2, late_s=late_s) for late_s in ({}, {"c1": 40.0}))

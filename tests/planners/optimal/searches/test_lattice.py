@@ -58,7 +58,7 @@ def test_near_the_bound_it_does_not_run() -> None:
     assert not search.is_open()
 
 
-def test_under_a_maximum_agl_it_runs_soon_and_again_after_a_first_path_that_is_a_little_off() -> None:
+def test_under_a_maximum_agl_it_runs_soon_and_again_near_a_path() -> None:
     search = lattice(100.0)
     assert search.share == search.BAND[0]
     search.choose()
