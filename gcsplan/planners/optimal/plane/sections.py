@@ -269,7 +269,7 @@ def _split_by_zones(plane: PlaneSearch, made: Sections) -> bool:
                 floor_m = bottom + (highest[at] if bottom_agl else 0.0)
                 ceiling_m = top + (lowest[at] if top_agl else 0.0)
                 inside = (made.aside[at] >= a + far_m) & (made.aside[at] <= b - far_m)
-                cut = inside & (ceiling_m - floor_m > thin) & (floor_m < high) & (ceiling_m > low)
+                cut = inside & (ceiling_m > floor_m + thin) & (floor_m < high) & (ceiling_m > low)
                 if cut.any():
                     below, above = cut & (low <= floor_m), cut & (ceiling_m <= high)
                     kept = np.concatenate([np.flatnonzero(part) for part in (~cut, below, above)])
