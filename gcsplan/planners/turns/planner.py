@@ -26,7 +26,7 @@ import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.planners.airspeed import Airspeed
-from gcsplan.planners.problem import Problem, ceiling_m
+from gcsplan.planners.problem import Problem, Refusal, ceiling_m
 from gcsplan.planners.simplify import thinned
 from gcsplan.planners.turns.arc_path import ArcPath, inserted, lacking_m, missed_m, through, unlooped
 from gcsplan.planners.turns.profile import Risen, rise
@@ -158,7 +158,10 @@ def with_more_clearance(problem: Problem, extra_m: float) -> Problem:
 
     def lifted(point: tuple[float, float, float]) -> tuple[float, float, float]:
         east, north, amsl = point
-        return east, north, max(amsl, float(problem.airspace.floor_amsl(east, north, limits)))
+        floor_m = float(problem.airspace.floor_amsl(east, north, limits))
+        if math.isinf(floor_m):
+            raise Refusal("no mission: ground near an end is unknown", reason="not_found", place=(east, north))
+        return east, north, max(amsl, floor_m)
 
     return replace(
         problem, limits=limits, start=lifted(problem.start), goal=lifted(problem.goal), turn_radius_m=0.0,
@@ -257,8 +260,9 @@ def _right(a: Floats, b: Floats) -> Floats:
 
 def _corners(flat: Floats, must: Bools, slack_m: float) -> Indices:
     """Indices of the points that remain without those near a straight line; ``must`` stay, and points within 1 mm of
-    the one before are dropped."""
+    the one before are dropped, of the last two the first."""
     index = thinned(flat, np.flatnonzero(must), slack_m)
-    apart = np.concatenate([[True], distances_m(flat[index])[1:] - distances_m(flat[index])[:-1] > 1e-3])
+    apart = np.concatenate([[True], np.diff(distances_m(flat[index])) > 1e-3])
+    apart[-2:-1] &= apart[-1] or len(apart) == 2
     apart[-1] = True
     return np.asarray(index[apart])

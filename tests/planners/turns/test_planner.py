@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from gcsplan.arrays import Floats
-from gcsplan.planners.problem import Problem, Via
+from gcsplan.planners.problem import Problem, Refusal, Via
 from gcsplan.planners.turns import planner
 from gcsplan.planners.turns.arc_path import MOST_DEG, moved
 from gcsplan.planners.turns.kernels import CHORD_M
@@ -21,6 +21,7 @@ from gcsplan.planners.turns.repair import tried
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.geometry.limits import Limits
 from gcsplan.world.geometry.path import Path
+from gcsplan.world.geometry.surface import Surface
 from gcsplan.world.geometry.zones import Circle, Polygon, Zone
 from tests.support.planner_worlds import faults, ground
 
@@ -433,6 +434,26 @@ def test_more_room_means_a_wider_track_and_ends_that_are_legal_with_it() -> None
     for end, lifted in ((problem.start, wider.start), (problem.goal, wider.goal)):
         assert lifted[:2] == end[:2]
         assert lifted[2] >= max(end[2], float(problem.airspace.floor_amsl(*end[:2], wider.limits)) - 1e-9)
+
+
+def test_there_is_no_more_room_beside_unknown_ground() -> None:
+    heights = np.zeros((101, 101))
+    heights[:, :50] = math.nan
+    known = ground(0.0)
+    air = Airspace(Surface(heights, heights, known.grid))
+    problem = Problem(air, Limits(50.0, track_error_m=5.0), (1020.0, 1000.0, 60.0), (1900.0, 1000.0, 60.0))
+    assert with_more_clearance(problem, 10.0).start == problem.start
+    with pytest.raises(Refusal):
+        with_more_clearance(problem, 40.0)
+
+
+def test_a_path_that_ends_with_a_climb_on_the_spot_has_finite_arcs() -> None:
+    air = Airspace(ground(0.0))
+    problem = Problem(air, Limits(10.0), (100.0, 100.0, 60.0), (1900.0, 900.0, 90.0), turn_radius_m=40.0)
+    points = np.array([problem.start, (900.0, 900.0, 60.0), (1900.0, 900.0, 60.0), problem.goal])
+    arc_path = arc_path_of(problem, points, np.array([True, False, True, True]), 0.5)
+    assert np.isfinite(arc_path.centre).all()
+    assert len(arc_path.centre) == 1
 
 
 def test_no_radius_is_no_question() -> None:
