@@ -93,10 +93,13 @@ class Route:
         rows += [[*self.place(m.items[self.last].lat_deg, m.items[self.last].lon_deg), z[1]]]
         self.points = np.array(rows)
         vias = [np.array([p["east_m"], p["north_m"]]) for p in self.request.get("via", [])]  # type: ignore[attr-defined]
-        at = [int(np.argmin(np.hypot(*(self.points[:, :2] - p).T))) for p in vias]
-        self.fixed = [0, *at, len(self.points) - 1]
+        # A wing passes a via on the arc between two way points.
+        near = [np.argsort(np.hypot(*(self.points[:, :2] - p).T))[: 1 + self.wing] for p in vias]
+        self.fixed = [0, *sorted(int(k) for pair in near for k in pair), len(self.points) - 1]
         if self.wing and len(self.points) > 3:  # its climb-out ends towards the second
             self.fixed.insert(1, 1)
+        if self.vehicle.request.vehicle.vtol and self.vehicle.request.end == "land" and len(self.points) > 4:
+            self.fixed.insert(-1, len(self.points) - 2)  # from there it has room to brake
         self.ends = (start, legs[-1].end)
         self.amsl = (start[2], legs[-1].end[2])
 
@@ -111,7 +114,8 @@ class Route:
 
     @property
     def wing(self) -> bool:
-        return "turn_radius_m" in self.request
+        """Whether it flies on its wing, and its bound is that of missions with its climb-out: a VTOL's too."""
+        return self.vehicle.request.vehicle.turn_radius_m > 0.0
 
     def place(self, lat: float, lon: float) -> tuple[float, float]:
         east, north = self.plan.world.frame.to_plane(lat, lon)
@@ -183,7 +187,7 @@ class Route:
             fast = self.request["speed_m_s"][1]  # type: ignore[index]
             up, down = (float(self.request.get(key, math.inf)) for key in ("climb_m_s", "descent_m_s"))  # type: ignore[arg-type]
             rises = [(leg, leg.end[2] - leg.start[2]) for leg in verdict.path_legs]
-            if "turn_radius_m" in self.request:
+            if self.wing:
                 return math.fsum(
                     max(leg.length_m / fast, z / up, -z / down) * leg.times / thinner(0.5 * (leg.start[2] + leg.end[2]))
                     for leg, z in rises

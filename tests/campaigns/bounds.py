@@ -226,7 +226,7 @@ def _refused(
         return None
     source = load_mission(folder / "mission.yaml")
     for v in ends.vehicles:
-        if "turn_radius_m" in case.vehicles[0]:
+        if v.request.vehicle.turn_radius_m > 0.0:
             continue
         route = Route(case, ends, v, Budget(time.monotonic() + world_s, most), source)
         route.try_points(route.points, "its plan without zones", "stop")
