@@ -145,7 +145,8 @@ def _about(
 ) -> list[str]:  # fmt: skip
     """Lines on the measurement and its machine."""
     sweeps = [o.sweep_s for o in outcomes if o.sweep_s is not None]
-    held = "with the clearance and errors of a real mission" if errors else "with no clearance and no errors"
+    usual = errors or all(o.kind == "ceiling" for o in outcomes)  # these have them always
+    held = "with the clearance and errors of a real mission" if usual else "with no clearance and no errors"
     pairs, sets = (max((r[i] for r in redraws), default=0) for i in (0, 1))
     lines = [
         f"Seed {seed}, {held}; gcsplan {version('gcsplan')}, Python {platform.python_version()}, {platform.machine()}.",
