@@ -23,7 +23,7 @@ MOVE_ROUNDS = 24
 SHARE = 0.3
 """Part of the counted work left that the moves of one path may take: legs along a zone over a slope take long."""
 LAST_GAIN = 2e-6
-"""A round that gains at most this part of the cost is the last, if no more is said."""
+"""A round that gains at most this part of the cost is the last, where no other part is given."""
 
 WAY_POINT_PRICE = 2e-5
 """The most that a path may become dearer for one way point less, as a part of its cost."""

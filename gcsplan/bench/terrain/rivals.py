@@ -56,7 +56,7 @@ def rivals(seconds: Sequence[float], *, ompl: bool = True, swarms: bool = True) 
 
 
 def solvable(named: Sequence[NamedProblem]) -> list[NamedProblem]:
-    """Those that rivals can solve: the shortest or the fastest path, without a turn radius."""
+    """The problems that rivals can solve: the shortest or the fastest path, without a turn radius."""
     return [
         one
         for one in named

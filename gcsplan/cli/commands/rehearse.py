@@ -220,7 +220,7 @@ def _ending(result: Rehearsal, units: Units) -> list[str]:
         lines.append(f"95 % of all arrivals lie within {result.p95_s:.2f} s of the plan")
     if result.inside_windows is not None:
         inside, arrivals = result.inside_windows
-        late = ", that of a late departure so much later" if any(v.shifted_s for v in result.vehicles) else ""
+        late = ", which a late departure moves as much" if any(v.shifted_s for v in result.vehicles) else ""
         lines.append(
             f"{inside} of {arrivals} {'arrivals lie' if arrivals > 1 else 'arrival lies'} inside the window{late}"
         )

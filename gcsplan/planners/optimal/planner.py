@@ -125,7 +125,7 @@ class _WingTime:
         return found, over
 
     def _stretch(self, over: Problem, flown: Floats) -> None:
-        """Raise the bound by that of the shortest path in the stretched plane. No path is searched there: the one
+        """Raise the bound by what the stretched plane bounds. No path is searched there: the one
         ``flown`` (N, 3), stretched, is short enough, and the check of a skew grid may refuse it."""
         plane = WindPlane.of(self.airspeed, max(over.start[2], over.goal[2]))
         there = plane.problem(over)

@@ -48,7 +48,7 @@ LEVEL_SLOPES, STEEPEST = (0.03, 0.07, 0.12, 0.18, 0.26, 0.36, 0.5), 1.0
 BEYOND = (0.1, 0.4, 1.0)
 """Prices of a metre of climb beyond the limit: parts of the way from its price to the price of laps."""
 LATER, EARLIER = 1.0 / 9.0, 4.0 / 9.0
-"""Of what rounding may take from a leg at its climb limit: the parts for planes up to the limit, of the longer of two
+"""The parts of what rounding may take from a leg at its climb limit: for planes up to the limit, of the longer of two
 legs, and for planes beyond it, of the shorter one. The square roots of both add up to one."""
 LAID_OUT = 35.0
 """Most nodes of a look, for the square root of its legs."""
