@@ -358,7 +358,7 @@ MOST_IN_A_FOLDER = 15
 
 MOST = {
     "modules": 504,
-    "statements": 74_242,
+    "statements": 74_247,
     "type names with two meanings": 0,
     "constants with two values": 0,
     "folders with more than 15 modules": 0,

@@ -45,6 +45,9 @@ NEAR_DEG = FARTHEST_M / 111_700.0
 HIGHEST_JUDGED_M = 20_000.0
 """Above any aircraft that gcsplan plans for, m; keeps absurd numbers out of the exact check."""
 
+MEETS_M = 1e-6
+"""Altitudes of two pieces of a leg that differ by no more are one, m."""
+
 
 def judge(
     mission: Mission,
@@ -289,6 +292,9 @@ def _figures(
     energy = vehicle.energy
     delta = plane.legs.end - plane.legs.start
     runs, rises = np.hypot(delta[:, 0], delta[:, 1]), delta[:, 2]
+    steps = np.zeros(len(rises))
+    steps[1:] = np.abs(plane.legs.start[1:, 2] - plane.legs.end[:-1, 2])  # from one tile of ground to the next
+    steps[1:][(plane.owner[1:] != plane.owner[:-1]) | (steps[1:] <= MEETS_M)] = 0.0
     edges = np.searchsorted(plane.owner, np.arange(len(flight.stretches) + 1))
     alone = len(plane.owner) == len(flight.stretches)
 
@@ -308,7 +314,8 @@ def _figures(
     ways = (ends - plane.legs.start[edges[:-1]])[:, :2].tolist()
     known = ~np.isnan(report.min_agl_m)
     rows = zip(
-        flight.stretches, each(np.sum, runs), each(np.sum, np.hypot(runs, rises)), each(np.sum, np.abs(rises)),
+        flight.stretches, each(np.sum, runs), each(np.sum, np.hypot(runs, rises) + steps),
+        each(np.sum, np.abs(rises) + steps),
         report.climb_deg[steepest].tolist(), world.airspace.surface.ground_at(ends[:, 0], ends[:, 1]).tolist(),
         each(_least, report.min_agl_m), world.frame.to_degrees(low_en[:, 0], low_en[:, 1]).tolist(),
         each(_most, np.where(known, report.max_agl_m, math.nan)), report.zone_clearance_m[near].tolist(),

@@ -137,6 +137,26 @@ def test_a_leg_that_ends_on_a_line_of_posts_has_no_steep_end() -> None:
     assert min(shortest) > 0.9e-3
 
 
+def test_a_step_of_the_vehicles_ground_between_two_degrees_takes_metres_and_energy() -> None:
+    """Posts of two degree tiles lie apart, so the ground that the vehicle reads steps where it flies into the next."""
+    where = fine_world(lambda e, n: 300.0 + 60.0 * np.sin(e / 90.0 + n / 160.0), at=(46.6, 9.0))
+    steps = []
+    for north_m in np.linspace(-300.0, 300.0, 7).tolist():
+        mission = flown(where, 120.0, (-5.0, north_m), (5.0, north_m + 1.0))
+        verdict = judge(mission, vehicle(), where)
+        leg = verdict.legs[-1]
+        rise_m = abs(leg.end[2] - leg.start[2])
+        energy = vehicle().energy
+        least_j = energy.under_way_j(rise_m, leg.horizontal_m, leg.time_s)
+        assert leg.energy_j >= least_j - 1e-3
+        assert leg.length_m >= math.hypot(leg.horizontal_m, rise_m) - 1e-6
+        east, west = (np.array([[e, north_m + 0.5], [0.0, north_m + 0.5]]) for e in (-4.0, 4.0))
+        ground = [float(where.vehicle_terrain.pieces(p)[0][2].ground_at(-1e-3 * k, north_m + 0.5))
+                  for k, p in ((1, east), (-1, west))]  # fmt: skip
+        steps.append(abs(ground[1] - ground[0]))
+    assert max(steps) > 1.0
+
+
 def test_ground_that_the_vehicle_does_not_get_is_not_flown_over() -> None:
     """Beside a void a part of 4 × 4 posts is unknown as a whole, far beyond the void itself."""
     flat = fine_world(lambda e, n: 300.0 + 0 * e)
