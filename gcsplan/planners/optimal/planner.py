@@ -34,6 +34,7 @@ from gcsplan.notes.note import Note
 from gcsplan.planners.airspeed import Airspeed, Shortest
 from gcsplan.planners.border import exit_cost
 from gcsplan.planners.optimal.loop.governor import govern
+from gcsplan.planners.optimal.loop.search import Improves
 from gcsplan.planners.optimal.loop.workspace import Workspace
 from gcsplan.planners.optimal.plane.incumbent import Incumbent
 from gcsplan.planners.optimal.table import all_searches, kinds, left_out
@@ -119,14 +120,17 @@ class _WingTime:
         over = replace(found.problem or problem, objective="length", progress=None)
         if found.lower_bound is not None:
             self.length_m = found.lower_bound
-            leaving = Shortest(max(found.lower_bound, _leaving(over)))
+            leaving = Shortest(max(found.lower_bound, over.rounding().bound(exit_cost(over))))
             self.bound_s = self._least_s(over, Shortest(found.lower_bound), leaving)
         self._take(found)
         return found, over
 
     def _stretch(self, over: Problem, flown: Floats) -> None:
-        """Raise the bound by what the stretched plane bounds. No path is searched there: the one
-        ``flown`` (N, 3), stretched, is short enough, and the check of a skew grid may refuse it."""
+        """Raise the bound by what the stretched plane bounds.
+
+        No search there looks for paths alone: the path ``flown`` (N, 3), stretched, is short enough to begin with. It
+        is taken without a check, because on a skew grid the check may refuse what is legal.
+        """
         plane = WindPlane.of(self.airspeed, max(over.start[2], over.goal[2]))
         there = plane.problem(over)
         rounding, leaving = there.rounding(), exit_cost(there)
@@ -137,16 +141,13 @@ class _WingTime:
         def in_seconds(now: Progress) -> None:
             self._tell(replace(now, path=None), self.cost_s, over, least(min(now.lower_bound or 0.0, leaving)))
 
-        paths = tuple(kind.NAME for kind in kinds() if kind.IMPROVES == "paths")
         there = replace(
-            there,
-            options={**there.options, "without": (*left_out(there), *paths)},
+            _without(there, "paths"),
             budget=there.budget.anew(there.budget_s, there.budget_mb),
             progress=None if self.problem.progress is None else in_seconds,
         )
         found = search(there, over.turn_radius_m <= 0.0, plane.stretched(flown)).incumbent.bound
-        bound_s = self._least_s(over, least(min(found, leaving)), least(leaving))
-        self.bound_s = max(self.bound_s, bound_s)
+        self.bound_s = max(self.bound_s, self._least_s(over, least(min(found, leaving)), least(leaving)))
 
     def _take(self, found: Solution) -> None:
         cost_s = self.airspeed.path_s((found.flown or found.path).points)
@@ -170,9 +171,10 @@ class _WingTime:
         return min(within_s, self.airspeed.least_s(leaving, ends, limits, beyond, *rest))
 
 
-def _leaving(problem: Problem) -> float:
-    """Metres that a path has at least which leaves the terrain."""
-    return problem.rounding().bound(exit_cost(problem))
+def _without(problem: Problem, improves: Improves) -> Problem:
+    """The problem without the searches that improve paths alone, or bounds alone."""
+    names = tuple(kind.NAME for kind in kinds() if improves == kind.IMPROVES)
+    return replace(problem, options={**problem.options, "without": (*left_out(problem), *names)})
 
 
 def _within(problem: Problem) -> Solution:
@@ -222,10 +224,8 @@ def _fastest(problem: Problem, sharp: bool) -> Incumbent:
         incumbent.proved_infeasible = shortest.proved_infeasible
         incumbent.take_over(shortest)
     if incumbent.best is not None and incumbent.goes_on():
-        bounds = tuple(kind.NAME for kind in kinds() if kind.IMPROVES == "bounds")
-        options = {**problem.options, "without": (*left_out(problem), *bounds)}
-        gentle = replace(problem, limits=problem.at_full_speed(problem.limits), options=options)
-        incumbent.take_over(search(gentle, sharp).incumbent)
+        gentle = replace(problem, limits=problem.at_full_speed(problem.limits))
+        incumbent.take_over(search(_without(gentle, "bounds"), sharp).incumbent)
     return incumbent
 
 

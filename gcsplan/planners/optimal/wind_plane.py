@@ -23,8 +23,7 @@ ELLIPSE_CORNERS = 48
 @dataclass(frozen=True, eq=False, slots=True)
 class WindPlane:
     """``forth`` (2, 2) maps the true plane to the stretched one, ``back`` from there: symmetric, 1 across the wind, and
-    ``most`` along it, which is 1 or more. ``true_m_s``: the true airspeed for which it is exact.
-    """
+    ``most`` along it, which is 1 or more. ``true_m_s``: the true airspeed for which it is exact."""
 
     forth: Floats
     back: Floats
@@ -62,10 +61,6 @@ class WindPlane:
     def stretched(self, points: Floats) -> Floats:
         """Points (N, 2 or more) of the true plane in the stretched one."""
         return np.column_stack([points[:, :2] @ self.forth, points[:, 2:]])
-
-    def _place(self, point: tuple[float, ...]) -> tuple[float, float]:
-        east_m, north_m = (np.array(point[:2]) @ self.forth).tolist()
-        return east_m, north_m
 
     def _surface(self, true: Surface) -> Surface:
         """The same heights over the stretched plane; level ground goes on to the sides of the box around it."""
