@@ -76,7 +76,8 @@ class CorridorRaster:
     def strict(self, by_m: float) -> None:
         """Keep more from floor and ceiling, up to 0.3 m, and 0.1 % more from the steepest slope, after the exact check
         refused a line that was legal here because it lacked ``by_m`` of height."""
-        self.margin_m, self.slope_part = self.margin_m + min(by_m + 0.05, 0.3), self.slope_part - 0.001
+        self.margin_m += min(by_m + 0.05, 0.3)
+        self.slope_part -= 0.001
 
     def learn(self, samples: Floats) -> None:
         """Raise the floor and lower the ceiling, by up to 10 m, where ``samples`` (K, 4) of east, north, floor, ceiling
@@ -135,20 +136,24 @@ class CorridorRaster:
             points, pinned, pin_m, amsl, n, float(p.start[2]), float(p.goal[2]), self.floor_m, self.ceiling_m,
             self.circles, self.edges, spec, steps_m, gain_m * unit, rounds, MOVE_REACH_M, *self.work,
         )  # fmt: skip
+        cost, missing = self.work[-1]
         return GuidedTrack(
             points[:count].copy(),
             pinned[:count] > 0.0,
             pin_m[:count].copy(),
             amsl[:count].copy(),
-            *(float(x) for x in self.work[-1]),  # cost and missing
+            float(cost),
+            float(missing),
         )
 
     def narrow(self, place: Floats, by_m: float, ceiling: bool = False) -> None:
         """Raise the floor (or lower the ceiling) by ``by_m`` at nodes around a place that the exact check refused."""
         i, j = math.floor((place[0] - self.west_m) / self.step_m), math.floor((place[1] - self.south_m) / self.step_m)
         rows, cols = slice(max(j, 0), max(j + 2, 0)), slice(max(i, 0), max(i + 2, 0))
-        raster = self.ceiling_m if ceiling else self.floor_m
-        raster[rows, cols] += -by_m if ceiling else by_m
+        if ceiling:
+            self.ceiling_m[rows, cols] -= by_m
+        else:
+            self.floor_m[rows, cols] += by_m
 
 
 def line_of(points: Floats, pinned: Bools, pin_m: Floats) -> GuidedTrack:

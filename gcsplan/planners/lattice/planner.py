@@ -107,9 +107,8 @@ def pulled(
     `GuidedTrack`."""
     way_m, over = straight_way_m(problem), sides_to_pass(problem, points, pinned, pin_m)
     points = np.ascontiguousarray(points[:, :2])
-    line = make_guide(problem, [points], ASIDE * way_m, over).pull(
-        line_of(points, pinned, pin_m), np.array(FINE_STEPS) * way_m, COARSE_GAIN * way_m, rounds=2
-    )
+    guide = make_guide(problem, [points], ASIDE * way_m, over)
+    line = guide.pull(line_of(points, pinned, pin_m), np.array(FINE_STEPS) * way_m, COARSE_GAIN * way_m, rounds=2)
     found = _mended(problem, judge, line, over, way_m)[0]
     return None if isinstance(found, Unsettled) else found
 
@@ -289,9 +288,8 @@ class _Work:
         return line_of(track.points, track.pinned, track.pin_m)
 
     def _guide(self, ways: list[Floats]) -> CorridorRaster:
-        return make_guide(
-            self.problem, ways, max(CORRIDOR * self.way_m, CORRIDOR_STEPS * self.router.lattice.step_m), self.over
-        )
+        radius = max(CORRIDOR * self.way_m, CORRIDOR_STEPS * self.router.lattice.step_m)
+        return make_guide(self.problem, ways, radius, self.over)
 
     def _steps(self, parts: tuple[float, ...]) -> Floats:
         return np.array(parts) * self.way_m
@@ -326,10 +324,9 @@ class _Work:
         across = np.array([-along[1], along[0]])
         bump = np.maximum(0.0, 1.0 - np.abs(s - at) / half) * ~line.pinned
         points = line.points + bump[:, None] * (side * across)
+        middle = np.array([np.interp(at, s, line.points[:, k]) for k in range(2)]) + side * across
         return GuidedTrack(
-            np.insert(
-                points, i + 1, [np.interp(at, s, line.points[:, k]) + side * across[k] for k in range(2)], axis=0
-            ),
+            np.insert(points, i + 1, middle, axis=0),
             np.insert(line.pinned, i + 1, False),
             np.insert(line.pin_m, i + 1, math.nan),
             np.insert(line.amsl_m, i + 1, 0.0),
