@@ -292,9 +292,9 @@ def _figures(
     energy = vehicle.energy
     delta = plane.legs.end - plane.legs.start
     runs, rises = np.hypot(delta[:, 0], delta[:, 1]), delta[:, 2]
-    steps = np.zeros(len(rises))
-    steps[1:] = np.abs(plane.legs.start[1:, 2] - plane.legs.end[:-1, 2])  # from one tile of ground to the next
-    steps[1:][(plane.owner[1:] != plane.owner[:-1]) | (steps[1:] <= MEETS_M)] = 0.0
+    # The ground that the vehicle reads may step from one degree tile to the next, so a leg's pieces need not meet.
+    apart_m = np.abs(plane.legs.start[1:, 2] - plane.legs.end[:-1, 2])
+    steps = np.append(0.0, np.where((plane.owner[1:] == plane.owner[:-1]) & (apart_m > MEETS_M), apart_m, 0.0))
     edges = np.searchsorted(plane.owner, np.arange(len(flight.stretches) + 1))
     alone = len(plane.owner) == len(flight.stretches)
 
