@@ -235,8 +235,10 @@ def elements(form: str, content: Any) -> dict[str, Element]:
         made = {}
         for i, one in enumerate(found if isinstance(found, list) else []):
             named = one.get("properties", one) if isinstance(one, dict) else {}
-            name = named.get("name") if isinstance(named, dict) else None
-            words = (f"{key}[{i}]", *([name.strip()] if isinstance(name, str) and name.strip() else [f"[{i}]"]))
+            # A zone without a name goes by its identifier.
+            names = [named.get(k) for k in ("name", "identifier")] if isinstance(named, dict) else []
+            name = next((n.strip() for n in names if isinstance(n, str) and n.strip()), f"[{i}]")
+            words = (f"{key}[{i}]", name)
             made[f"{key}[{i}]"] = Element(json.dumps(one), words)
         return made
     lines = content.splitlines()
